@@ -73,6 +73,7 @@ pub use extension::soft_range::{SoftRange, SoftRangeModel};
 pub use extension::variant::{VariantInfo, VariantModel};
 pub use extension::workspace_bounds::{WorkspaceBounds, WorkspaceBoundsModel};
 pub use extension::world::{MAX_PORTS, WorldModel};
+pub use extension::world_contacts::WorldContactsModel;
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};
 pub use glam;
 pub use glam::{DMat3, DQuat, DVec3};

@@ -88,7 +88,7 @@ mod tests {
         energy_ledger::EnergyLedgerTable, grip::GripTable, independent_stop::IndependentStopTable,
         linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable,
         soft_range::SoftRangeTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
-        world::WorldTable,
+        world::WorldTable, world_contacts::WorldContactsTable,
     };
 
     /// One byte short of the shortest tables there are.
@@ -136,6 +136,7 @@ mod tests {
         is_held_to_its_length::<LinearFieldTable>();
         is_held_to_its_length::<WorkspaceBoundsTable>();
         is_held_to_its_length::<WorldTable>();
+        is_held_to_its_length::<WorldContactsTable>();
         is_held_to_its_length::<DeviceTable>();
         is_held_to_its_length::<EnergyLedgerTable>();
         is_held_to_its_length::<CalibrationTable>();

@@ -20,6 +20,7 @@ pub mod soft_range;
 pub mod variant;
 pub mod workspace_bounds;
 pub mod world;
+pub mod world_contacts;
 
 macro_rules! extensions {
     ($($name:ident),+ $(,)?) => {
@@ -45,6 +46,7 @@ extensions! {
     variant,
     workspace_bounds,
     world,
+    world_contacts,
     calibration,
     connection,
     energy_ledger,

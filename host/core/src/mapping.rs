@@ -6,6 +6,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
+use crate::asynchronous::ContactLimits;
 use flotor_hal::{DQuat, DVec3, Demand, DeviceState, GripKind, GripState, Input, Pose, Tick, Twist, Wrench};
 
 /// Scales and rotation between the device frame and a model's frame.
@@ -36,6 +37,8 @@ pub struct PortConfig {
     pub mapping: MappingConfig,
     /// Home of the model in the device frame, m.
     pub place_m: [f64; 3],
+    /// Limits of the contacts at this device; `None` for a model in the loop.
+    pub contacts: Option<ContactLimits>,
 }
 
 /// Weight, priority and fade time of a model among the models of its scene.

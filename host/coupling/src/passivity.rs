@@ -10,9 +10,11 @@ use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 /// the force.
 const RESERVE_ACCELERATION_M_PER_S2: f64 = 50.0;
 /// Stiffness that the reserve covers, N/m.
-const RESERVE_STIFFNESS_N_PER_M: f64 = 100.0;
+const RESERVE_STIFFNESS_N_PER_M: f64 = 200.0;
+/// Share of the reserve for motion as predicted; the rest covers a handle that starts faster than predicted.
+const PREDICTED_SHARE: f64 = 0.5;
 
-/// Returns the energy that the port may deliver beyond the energy received, J: the energy of a spring of 100 N/m over the distance
+/// Returns the energy that the port may deliver beyond the energy received, J: the energy of a spring of 200 N/m over the distance
 /// that a handle covers at 50 m/s² in a period, `K a² T⁴ / 8`. Without a reserve, an empty port could never exert a force. Not
 /// real-time.
 fn reserve_j(period_s: f64) -> f64 {
@@ -21,10 +23,12 @@ fn reserve_j(period_s: f64) -> f64 {
 }
 
 /// Passivity observer of one port, with an optional passivity controller.
+#[derive(Clone)]
 pub struct Passivity {
     mode: PassivityMode,
     controller: Controller,
-    reserve_j: f64,
+    /// Part of the reserve that the predicted motion may take, J.
+    predicted_j: f64,
     /// Driven axes of force and torque: 1 for a driven axis, 0 for an axis without force or torque.
     driven: [DVec3; 2],
     energy_j: f64,
@@ -36,8 +40,8 @@ impl Passivity {
     /// Creates the stage for a port with the force and torque limits `most`, N and N·m. Not real-time.
     pub fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
         let driven = most.map(|most| DVec3::select(most.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO));
-        let reserve_j = reserve_j(controller.period_s());
-        Self { mode, controller, reserve_j, driven, energy_j: 0.0, change: None }
+        let predicted_j = PREDICTED_SHARE * reserve_j(controller.period_s());
+        Self { mode, controller, predicted_j, driven, energy_j: 0.0, change: None }
     }
 
     /// Records the displacement since the last sample, while `held` was applied; returns the energy that the controller removed
@@ -56,8 +60,8 @@ impl Passivity {
         self.energy_j
     }
 
-    /// Returns a wrench with which the port delivers no more energy than it has, the reserve included; `None` if the wrench may
-    /// pass unchanged. Only motion along driven axes counts: along an axis without drive no force can damp.
+    /// Returns a wrench with which the predicted motion takes no more energy than the port has, with the predicted share of the
+    /// reserve; `None` if the wrench may pass unchanged. Only motion along driven axes counts: along an axis without drive no force can damp.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -68,7 +72,7 @@ impl Passivity {
                 let [linear, angular] = self.driven;
                 let twist = Twist::new(state.twist.linear() * linear, state.twist.angular() * angular);
                 self.controller.follow(&twist);
-                let available_j = self.energy_j + self.reserve_j;
+                let available_j = self.energy_j + self.predicted_j;
                 let limited = self.controller.keep_within(available_j, wrench, held, &twist)?;
                 self.change = Some(limited - *wrench);
                 Some(limited)

@@ -279,6 +279,7 @@ impl From<&PortConfig> for schema::Port {
             device: port.device.into(),
             mapping: Some(Mapping::new(&port.mapping)),
             place: Some(Vector3::new(port.place_m)),
+            contacts: port.contacts.map(schema::ContactLimits::from),
         }
     }
 }
@@ -291,6 +292,7 @@ impl TryFrom<schema::Port> for PortConfig {
             device: u16::try_from(port.device).map_err(|_| Missing("plugin.shared_with.device"))?,
             mapping: port.mapping.ok_or(Missing("plugin.shared_with.mapping"))?.config()?,
             place_m: port.place.ok_or(Missing("plugin.shared_with.place"))?.to_array(),
+            contacts: port.contacts.map(ContactLimits::from),
         })
     }
 }

@@ -215,6 +215,7 @@ messages! {
         device: u32 = 1 [uint32],
         mapping: Option<Mapping> = 2 [message, optional],
         place: Option<Vector3> = 3 [message, optional],
+        contacts: Option<ContactLimits> = 4 [message, optional],
     }
 
     FieldTiming: Copy {
@@ -262,7 +263,7 @@ enum Level {
     Fatal = 5,
 }
 
-/// Defines enumerations of the schema, with the name of 0 if 0 is no value, and their conversion from and to the value of a field.
+/// Defines enumerations of the schema, with the name of 0 if 0 is not a value, and their conversion from and to the value of a field.
 macro_rules! enumerations {
     ($($wire:ident $(($none:ident))? of $value:ident { $($name:ident = $number:tt),+ })+) => {
         $(#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]

@@ -16,7 +16,6 @@
 
 pub mod calibration_file;
 mod calls;
-mod estimates;
 pub mod headless;
 mod long_call;
 mod measurements;
@@ -28,22 +27,20 @@ pub mod run_description;
 pub mod scene;
 mod session;
 pub mod summary;
-mod tally;
 pub mod telemetry;
 
 pub use calls::{
     Call, CallError, LIMIT_VARIABLE, Notice, STEP_LIMIT_VARIABLE, Unresponsive, is_abandoned, on_notice,
     stop_waits_with,
 };
-pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
 pub use long_call::{Exceeded, LongCall, step_limit};
 pub use measurements::{Measurements, RunRecording};
 pub use platform::ThreadClock;
 pub use plugin_process::PluginProcess;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, Lockstep,
-    NewValue, Observer, Outcome, PluginReport, RunError, RunOptions, Session, Steps, StopReach, StopTime,
-    StopWithoutHost, Strength, StrongDevice, Tap, UnfreedPlugins, WatchdogStart, check_plugins,
-    prepare_model, start_watchdog_process,
+    ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, LiveNumbers,
+    Lockstep, NewValue, Observer, Outcome, PluginReport, RunError, RunOptions, SavedRun, Session, Steps,
+    StopReach, StopTime, StopWithoutHost, Strength, StrongDevice, Tap, UnfreedPlugins, WatchdogStart,
+    check_plugins, prepare_model, start_watchdog_process,
 };

@@ -7,7 +7,6 @@ use flotor_command::{CommandError, style, while_preparing};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
 use flotor_loader::{Metadata, Plugin};
-use flotor_session::estimates;
 use flotor_session::registry::{Findings, PATH_VARIABLE, Registry, SkippedFolder, installation_is_unknown};
 use serde::Serialize;
 use std::time::Instant;
@@ -143,7 +142,7 @@ fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandEr
         Err(error) => return Err(error.into()),
     };
     let ready_s = started.elapsed().as_secs_f64();
-    let estimates = estimates(&mut model);
+    let estimates = model.estimates();
     if estimates.is_empty() && sets.is_empty() {
         return Ok(());
     }

@@ -2,12 +2,12 @@
 
 use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, State, Surroundings};
-use crate::touch::Touch;
+use crate::touch::{SupportPlane, Touch};
 use flotor_hal::{
     Contact, ContactSet, ContactSetModel, DQuat, DVec3, ForceModel, Input, MAX_PORTS, Memory, ModelInfo,
     Output, Parameter, Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape,
-    ShapeModel, Sides, SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, WorldModel, Wrench,
-    choices, read_text, restorable,
+    ShapeModel, Sides, SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, WorldContactsModel,
+    WorldModel, Wrench, choices, read_text, restorable,
 };
 use std::path::Path;
 
@@ -90,6 +90,18 @@ impl Membrane {
     /// Returns the centre of the ball for a position of the handle, m; at home the ball lies on the sheet.
     fn centre_m(&self, handle_m: DVec3) -> DVec3 {
         handle_m + DVec3::Z * self.radius_m
+    }
+
+    /// Returns the centre of the ball of each port, m, and whether any input is valid: the ball of another stays where it is.
+    fn centres_m(&self, inputs: &[Input]) -> ([DVec3; MAX_PORTS], bool) {
+        let mut centres_m = std::array::from_fn(|port| self.touch.centre_m(port));
+        let mut is_valid = false;
+        for (input, centre_m) in inputs.iter().zip(&mut centres_m) {
+            if let Ok((handle_m, _)) = Self::reached(input) {
+                (*centre_m, is_valid) = (self.centre_m(handle_m), true);
+            }
+        }
+        (centres_m, is_valid)
     }
 
     /// Returns the handle's position limited to the workspace, with the status of the step.
@@ -215,13 +227,8 @@ impl WorldModel for Membrane {
     /// Moves the ball of every port through one network. The ball of an invalid input stays where it is, and its hand feels no
     /// force; without a valid input the network stands still.
     fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output]) {
-        let mut centres_m: [DVec3; MAX_PORTS] = std::array::from_fn(|port| self.touch.centre_m(port));
-        let (mut forces_n, mut is_valid) = ([DVec3::ZERO; MAX_PORTS], false);
-        for (input, centre_m) in inputs.iter().zip(&mut centres_m) {
-            if let Ok((handle_m, _)) = Self::reached(input) {
-                (*centre_m, is_valid) = (self.centre_m(handle_m), true);
-            }
-        }
+        let (centres_m, is_valid) = self.centres_m(inputs);
+        let mut forces_n = [DVec3::ZERO; MAX_PORTS];
         if is_valid && let [first, ..] = inputs {
             let centres_m = &centres_m[..inputs.len().min(MAX_PORTS)];
             self.touch.advance_among(centres_m, first.dt_s().min(LONGEST_TIME_S), &mut forces_n);
@@ -272,15 +279,35 @@ const PROBE_SHARE: f64 = 0.125;
 impl ContactSetModel for Membrane {
     /// Returns the plane under the ball.
     fn contact_set(&mut self, input: &Input) -> ContactSet {
-        let Ok((handle_m, _)) = Self::reached(input) else { return ContactSet::NONE };
-        let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
-        let plane = self.touch.measure_plane(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
-        let input = Input { pose: Pose::new(handle_m, input.pose.orientation()), ..*input };
-        // Farther than half the longest spring, other masses make or lose contact.
-        let set = ContactSet { valid_m: 0.5 * self.coarseness_m, ..ContactSet::at(&input) };
-        plane.map_or(set, |plane| {
-            set.with(Contact::of_handle(&input, plane.normal, plane.gap_m, plane.stiffness_n_per_m))
-        })
+        let mut set = [ContactSet::NONE];
+        self.contact_sets(std::slice::from_ref(input), &mut set);
+        let [set] = set;
+        set
+    }
+}
+
+impl WorldContactsModel for Membrane {
+    /// Moves the ball of every port through one network, and returns the plane under each. The ball of an invalid input stays where it
+    /// is, without a plane; without a valid input the network stands still.
+    fn contact_sets(&mut self, inputs: &[Input], sets: &mut [ContactSet]) {
+        let count = inputs.len().min(MAX_PORTS);
+        let (centres_m, is_valid) = self.centres_m(inputs);
+        if !is_valid {
+            return;
+        }
+        let time_s = inputs.first().map_or(0.0, |first| first.dt_s().min(LONGEST_TIME_S));
+        let (probe_m, mut planes) = (PROBE_SHARE * self.coarseness_m, [None; MAX_PORTS]);
+        self.touch.measure_planes(&centres_m[..count], time_s, probe_m, &mut planes[..count]);
+        for ((input, set), plane) in inputs.iter().zip(sets).zip(planes) {
+            let Ok((handle_m, _)) = Self::reached(input) else { continue };
+            let input = Input { pose: Pose::new(handle_m, input.pose.orientation()), ..*input };
+            // Farther than half the longest spring, other masses make or lose contact.
+            let empty = ContactSet { valid_m: 0.5 * self.coarseness_m, ..ContactSet::at(&input) };
+            *set = plane.map_or(empty, |plane| {
+                let SupportPlane { normal, gap_m, stiffness_n_per_m } = plane;
+                empty.with(Contact::of_handle(&input, normal, gap_m, stiffness_n_per_m))
+            });
+        }
     }
 }
 
@@ -292,7 +319,7 @@ impl SoftRangeModel for Membrane {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("damping_per_s", 5.0, 500.0, 5.0)];
 }
 
-flotor_hal::export_model!(Membrane, contact_set, shape, snapshot, soft_range, world);
+flotor_hal::export_model!(Membrane, contact_set, shape, snapshot, soft_range, world, world_contacts);
 
 #[cfg(test)]
 mod tests {

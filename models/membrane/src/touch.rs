@@ -95,45 +95,71 @@ impl Touch {
         self.balls[port].centre_m
     }
 
-    /// Advances the network as [`Self::advance`] does, and returns the plane with the same force on the ball at the end. The plane is as
-    /// stiff as the change of the force along its normal by finite differences: the movement is repeated to a point `probe_m` farther, in
-    /// the direction of motion. The stiffness thus contains the network's inertia and compliance over this time, and upcoming contacts.
-    /// With a short probe the impact of a single mass would count as stiffness.
-    ///
-    /// A ball that touches no mass gets the plane at the nearest mass, and the probe ends inside the network. Returns `None` if the
-    /// nearest mass is farther from the ball than its radius, or does not push the probe. Real-time: bounded by twice
-    /// [`Self::steps_in`], no allocation.
+    /// Advances the network as [`Self::advance`] does, and returns the plane with the same force on the ball at the end, as
+    /// [`Self::measure_planes`] does for one port. Real-time: bounded by twice [`Self::steps_in`], no allocation.
     pub fn measure_plane(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> Option<SupportPlane> {
-        let from_m = self.balls[0].centre_m;
-        self.before.clone_from(self.network.state());
-        let force_n = self.advance(centre_m, duration_s);
-        let (push_n, plane) = match force_n.try_normalize() {
-            Some(normal) => (force_n.length(), Some((normal, 0.0))),
-            None => (0.0, self.nearest().filter(|(_, clearance_m)| *clearance_m <= self.balls[0].radius_m)),
-        };
-        let (normal, clearance_m) = plane?;
-        self.after.clone_from(self.network.state());
-        self.network.restore(&self.before);
-        self.balls[0].centre_m = from_m;
-        let is_touching = push_n > 0.0;
-        let outward_m =
-            if is_touching { probe_m.copysign((centre_m - from_m).dot(normal)) } else { -probe_m };
-        let probed_m = centre_m + normal * (outward_m - clearance_m);
-        let probed_n = self.advance(probed_m, duration_s).dot(normal);
-        self.network.restore(&self.after);
-        self.balls[0].centre_m = centre_m;
-        // Where an impact ends, the force may fall with depth; no plane is farther away than the radius.
-        let stiffness_n_per_m = ((push_n - probed_n) / outward_m).max(push_n / self.balls[0].radius_m);
-        let gap_m = if is_touching { -push_n / stiffness_n_per_m } else { clearance_m };
-        (stiffness_n_per_m > 0.0).then_some(SupportPlane { normal, gap_m, stiffness_n_per_m })
+        let mut plane = [None];
+        self.measure_planes(&[centre_m], duration_s, probe_m, &mut plane);
+        let [plane] = plane;
+        plane
     }
 
-    /// Returns the direction from the nearest mass to the centre of the ball, and the distance of the mass from the ball, m, at least 0.
-    fn nearest(&self) -> Option<(DVec3, f64)> {
-        let positions_m = self.network.positions_m();
-        let outward = (0..positions_m.x.len()).map(|index| self.balls[0].centre_m - positions_m.get(index));
+    /// Advances the network as [`Self::advance_among`] does, and writes for each port the plane with the same force on its ball at the
+    /// end. The plane is as stiff as the change of the force along its normal by finite differences: the movement is repeated, with this
+    /// ball to a point `probe_m` farther, in the direction of motion. The stiffness thus contains the network's inertia and compliance
+    /// over this time, and upcoming contacts. With a short probe the impact of a single mass would count as stiffness.
+    ///
+    /// A ball that touches no mass gets the plane at the nearest mass, and the probe ends inside the network. A port has no plane if
+    /// the nearest mass is farther from the ball than its radius, or does not push the probe. Real-time: bounded by the number of ports
+    /// plus one times the steps of [`Self::advance_among`], no allocation.
+    pub fn measure_planes(
+        &mut self,
+        centres_m: &[DVec3],
+        duration_s: f64,
+        probe_m: f64,
+        planes: &mut [Option<SupportPlane>],
+    ) {
+        let (from, mut forces_n) = (self.balls, [DVec3::ZERO; MAX_PORTS]);
+        self.before.clone_from(self.network.state());
+        self.advance_among(centres_m, duration_s, &mut forces_n);
+        self.after.clone_from(self.network.state());
+        let to = self.balls;
+        for (port, ((plane, force_n), centre_m)) in planes.iter_mut().zip(forces_n).zip(centres_m).enumerate()
+        {
+            let radius_m = to[port].radius_m;
+            let (push_n, support) = match force_n.try_normalize() {
+                Some(normal) => (force_n.length(), Some((normal, 0.0))),
+                None => (0.0, self.nearest(port).filter(|(_, clearance_m)| *clearance_m <= radius_m)),
+            };
+            *plane = None;
+            let Some((normal, clearance_m)) = support else { continue };
+            let is_touching = push_n > 0.0;
+            let inward_m = (*centre_m - from[port].centre_m).dot(normal);
+            let outward_m = if is_touching { probe_m.copysign(inward_m) } else { -probe_m };
+            let mut probed_m = [DVec3::ZERO; MAX_PORTS];
+            probed_m[..centres_m.len()].copy_from_slice(centres_m);
+            probed_m[port] = *centre_m + normal * (outward_m - clearance_m);
+            self.network.restore(&self.before);
+            self.balls = from;
+            let mut probed_n = [DVec3::ZERO; MAX_PORTS];
+            self.advance_among(&probed_m[..centres_m.len()], duration_s, &mut probed_n);
+            self.network.restore(&self.after);
+            self.balls = to;
+            // Where an impact ends, the force may fall with depth; no plane is farther away than the radius.
+            let probed_n = probed_n[port].dot(normal);
+            let stiffness_n_per_m = ((push_n - probed_n) / outward_m).max(push_n / radius_m);
+            let gap_m = if is_touching { -push_n / stiffness_n_per_m } else { clearance_m };
+            *plane = (stiffness_n_per_m > 0.0).then_some(SupportPlane { normal, gap_m, stiffness_n_per_m });
+        }
+    }
+
+    /// Returns the direction from the nearest mass to the centre of the ball of a port, and the distance of the mass from the ball, m,
+    /// at least 0.
+    fn nearest(&self, port: usize) -> Option<(DVec3, f64)> {
+        let (positions_m, Ball { centre_m, radius_m }) = (self.network.positions_m(), self.balls[port]);
+        let outward = (0..positions_m.x.len()).map(|index| centre_m - positions_m.get(index));
         let nearest = outward.min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
-        Some((nearest.try_normalize()?, (nearest.length() - self.balls[0].radius_m).max(0.0)))
+        Some((nearest.try_normalize()?, (nearest.length() - radius_m).max(0.0)))
     }
 
     /// Relaxes `state` under a ball fixed at `centre_m`; the network itself does not change. Returns true if the masses

@@ -1,6 +1,9 @@
 //! Two hands on one membrane against a simulation of its own: masses in a list, springs in a list, no blocks.
 
-use flotor_hal::{DQuat, DVec3, ForceModel, Input, Output, Pose, Settings, WorldModel};
+use flotor_hal::{
+    ContactSet, ContactSetModel, DQuat, DVec3, ForceModel, Input, Output, Pose, Settings, WorldContactsModel,
+    WorldModel,
+};
 use flotor_membrane::Membrane;
 use flotor_membrane::mesh::{Mesh, Sheet};
 
@@ -139,4 +142,48 @@ fn a_port_whose_pose_is_lost_leaves_its_ball_and_feels_nothing() {
     }
     assert_eq!(outputs[0][1].wrench.force(), DVec3::ZERO);
     assert!(outputs[1][1].wrench.force().z > 0.0);
+}
+
+#[test]
+fn the_planes_under_two_hands_push_as_a_plain_simulation_at_the_rate_of_the_model() {
+    const EVERY: u64 = 5;
+    let (mut shared, mut alone, mut plain) = (membrane(), membrane(), Plain::new());
+    let at_anchor_n = |set: &ContactSet| {
+        let contacts = set.contacts().iter();
+        contacts
+            .map(|contact| {
+                DVec3::from_array(contact.normal) * (contact.stiffness_n_per_m * (-contact.gap_m).max(0.0))
+            })
+            .sum::<DVec3>()
+    };
+    let (mut farthest, mut largest_n) = (0.0_f64, 0.0_f64);
+    for tick in (0..600).step_by(5) {
+        let dt_ns = if tick == 0 { 0 } else { EVERY * 1_000_000 };
+        let inputs = hands(tick).map(|hand| Input { dt_ns, ..input(tick, hand) });
+        let (mut sets, mut one) = ([ContactSet::NONE; 2], [ContactSet::NONE]);
+        shared.contact_sets(&inputs, &mut sets);
+        alone.contact_sets(&inputs[..1], &mut one);
+        let expected_n =
+            plain.advance(hands(tick).map(|hand| hand + DVec3::Z * RADIUS_M), dt_ns as f64 * 1.0e-9);
+        for (set, expected_n) in sets.iter().zip(expected_n) {
+            largest_n = largest_n.max(expected_n.length());
+            let wrong_n = (at_anchor_n(set) - expected_n).length();
+            // Relative to the force in contact; without contact both are zero.
+            assert!(wrong_n <= 1.0e-9 * expected_n.length().max(1.0e-3), "tick {tick}: {wrong_n} N");
+        }
+        farthest = farthest.max((at_anchor_n(&sets[0]) - at_anchor_n(&one[0])).length());
+    }
+    assert!(largest_n > 0.2, "both hands press: {largest_n} N");
+    assert!(farthest > 0.02, "the left hand feels the right one: {farthest} N");
+}
+
+#[test]
+fn one_port_has_the_contacts_of_a_model_on_one_device() {
+    let (mut shared, mut alone) = (membrane(), membrane());
+    for tick in 0..200 {
+        let input = input(tick, hands(tick)[1]);
+        let mut set = [ContactSet::NONE];
+        shared.contact_sets(&[input], &mut set);
+        assert_eq!(set[0], alone.contact_set(&input), "tick {tick}");
+    }
 }

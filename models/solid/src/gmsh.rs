@@ -79,7 +79,7 @@ impl Words<'_> {
         let count: usize = self.number()?;
         if others.saturating_add(count) > MOST {
             let problem = format!(
-                "{count} more entries are too many, a mesh may have at most {MOST} of a kind: use a coarser mesh"
+                "{count} more entries exceed the limit of {MOST} nodes or elements: use a coarser mesh"
             );
             return Err(FormatError { line: self.line, problem });
         }
@@ -157,7 +157,7 @@ impl Reader {
         let is_binary = words.number::<u8>()? != 0;
         if !(4.1..4.2).contains(&version) {
             return lines.fail(format!(
-                "format {version} is not read: write format 4.1 (`gmsh -format msh41`, or `Mesh.MshFileVersion = 4.1`)"
+                "format {version} is not supported: write format 4.1 (`gmsh -format msh41`, or `Mesh.MshFileVersion = 4.1`)"
             ));
         }
         if is_binary {
@@ -239,12 +239,12 @@ impl Reader {
                 }
                 10 | 12 => {
                     return lines
-                        .fail("bricks of 27 nodes are not read: write bricks of 20 nodes (`Mesh.SecondOrderIncomplete = 1`)");
+                        .fail("bricks of 27 nodes are not supported: write bricks of 20 nodes (`Mesh.SecondOrderIncomplete = 1`)");
                 }
                 1 | 8 | 15 => 0, // lines and points
                 _ => {
                     return lines.fail(format!(
-                        "elements of Gmsh's type {kind} are not read: use tetrahedra of 10 nodes (type 11) and \
+                        "elements of Gmsh's type {kind} are not supported: use tetrahedra of 10 nodes (type 11) and \
                          bricks of 20 nodes (type 17)"
                     ));
                 }

@@ -3,7 +3,7 @@
 use crate::closest::Foot;
 use crate::surface::{Place, Surface};
 
-/// Most contacts at once: three determine a position, a fourth takes the place of one of them.
+/// Maximum number of simultaneous contacts: three determine a position, a fourth can replace one of them.
 pub(crate) const MOST_CONTACTS: usize = 4;
 /// Distance of two points that count as one, m.
 const SAME_M: f64 = 1.0e-9;
@@ -16,7 +16,7 @@ pub(crate) enum Side {
     Front,
     /// Other side, of an open surface only.
     Back,
-    /// Not determined: at the rim of an open surface.
+    /// Not determined: at the border of an open surface.
     Rim,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct Contact {
     pub(crate) side: Side,
 }
 
-/// Contacts of a ball, the first ones of the places in use.
+/// Contacts of a ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Contacts {
     pub(crate) all: [Option<Contact>; MOST_CONTACTS],
@@ -56,7 +56,7 @@ impl Contacts {
         self.iter().next()
     }
 
-    /// Adds a contact; returns false if it is one already or there is no room.
+    /// Adds a contact; returns false if the contact exists already or the list is full.
     pub(crate) fn add(&mut self, contact: Contact) -> bool {
         let is_known = self.iter().any(|other| is_same(&other.place.foot, &contact.place.foot));
         match self.all.iter_mut().find(|place| place.is_none()) {
@@ -69,7 +69,7 @@ impl Contacts {
     }
 }
 
-/// Returns true for two feet at one point of one sheet.
+/// Returns true if two closest points coincide and have the same normal.
 fn is_same(a: &Foot, b: &Foot) -> bool {
     (a.point_m - b.point_m).length() < SAME_M && a.normal.dot(b.normal) > 1.0 - 1.0e-9
 }

@@ -58,6 +58,45 @@ fn one_hand_feels_the_other_on_a_shared_membrane_and_not_on_two() {
     assert_eq!(names, ["membrane"]);
 }
 
+/// The membrane of [`SHARED`] and those of [`APART`], computed at 200 Hz.
+fn asynchronously(models: &str) -> String {
+    let field = "[model.field]\nrate_hz = 200\n";
+    models
+        .replace("shared = true\n", &format!("shared = true\n{field}"))
+        .replace("0] }\n[[model]]", &format!("0] }}\n{field}[[model]]"))
+        + if models == APART { field } else { "" }
+}
+
+#[test]
+fn one_hand_feels_the_other_on_a_shared_membrane_beside_the_loop_and_nothing_pulls() {
+    let [shared, apart] =
+        [SHARED, APART].map(|models| watch(&format!("{}{}", hands(1), asynchronously(models))));
+    for device in [0, 1] {
+        let pairs = of_device(&shared, device).into_iter().zip(of_device(&apart, device));
+        let differs = pairs.map(|(a, b)| (a.model.force() - b.model.force()).length()).fold(0.0, f64::max);
+        assert!(differs > 0.01, "device {device}: {differs} N");
+        let lowest_n =
+            of_device(&shared, device).iter().map(|record| record.model.force().z).fold(0.0, f64::min);
+        assert!(lowest_n >= 0.0, "device {device} is pulled with {lowest_n} N");
+    }
+    assert_eq!(shared.outcome.models.len(), 1);
+    assert!(shared.outcome.models.iter().all(|(_, health, _)| health.is_good()));
+}
+
+#[test]
+fn a_shared_membrane_beside_the_loop_has_one_digest_and_replays() {
+    let scratch = Scratch::default();
+    let swap = "[[change]]\nat_s = 0.4\nswap = \"membrane\"\nparameters = { stretch = 1.5 }\n";
+    let (recording, plain, with) =
+        recorded(&scratch, &format!("{}{}{swap}", hands(1), asynchronously(SHARED)));
+    assert_eq!(plain["trace_digest"], with["trace_digest"]);
+    let path = recording.display().to_string();
+    let replayed = Flotor::with(["replay", &path, "--json", "-"]).run();
+    assert_eq!(replayed.code, Some(exit_code::OK), "{replayed:?}");
+    let report: Value = serde_json::from_str(&replayed.stdout).expect("JSON");
+    assert_eq!(report["differing_ticks"], 0, "{report}");
+}
+
 #[test]
 fn a_recording_changes_no_bit_has_one_model_on_two_devices_and_replays() {
     let scratch = Scratch::default();
@@ -127,7 +166,6 @@ fn what_cannot_be_shared_is_refused_in_one_line() {
             "`model.shared` needs 2 to 4 different devices",
         ),
         (format!("{both}isolation = \"process\""), "a shared model runs in the host process"),
-        (format!("{both}[model.field]\nrate_hz = 200"), "a shared model runs in the loop"),
         (
             format!("{both}mapping = {{ positions_mm = [[0, 0, 0], [1, 0, 0]] }}"),
             "one position on each device",
@@ -138,7 +176,7 @@ fn what_cannot_be_shared_is_refused_in_one_line() {
             format!(
                 "{both}[[model.port]]\ndevice = \"left\"\nmapping = {{}}\n[[model.port]]\ndevice = \"left\"\nmapping = {{}}"
             ),
-            "each device has one at most",
+            "needs a different device of the model",
         ),
         (
             "device = \"left\"\n[[model.port]]\ndevice = \"left\"\nmapping = {}".to_owned(),
@@ -154,4 +192,10 @@ fn what_cannot_be_shared_is_refused_in_one_line() {
     let ran = Flotor::with(["run", &scene, "--clock", "virtual"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(ran.error().contains("it does not offer `flotor.world/1`"), "{ran:?}");
+    // The wall has no state between its hands, so it offers no contacts for several of them.
+    let wall = format!("{}[[model]]\nplugin = \"wall\"\n{both}[model.field]\nrate_hz = 200\n", hands(1));
+    let scene = scratch.file("slow.toml", wall).display().to_string();
+    let ran = Flotor::with(["run", &scene, "--clock", "virtual"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("it does not offer `flotor.world-contacts/1`"), "{ran:?}");
 }

@@ -20,10 +20,11 @@ impl Model {
         CallStatus::from_code(self.calls.call(|instance| unsafe { ask(instance, input, set) }))
     }
 
-    /// Returns true if the model can run asynchronously: it offers contact sets, or a local linear field.
+    /// Returns true if the model can run asynchronously: it offers contact sets, for one port or for several, or a local linear
+    /// field.
     #[must_use]
     pub fn has_local_model(&self) -> bool {
-        self.has_contact_set() || self.has_linear_field()
+        self.has_contact_set() || self.has_world_contacts() || self.has_linear_field()
     }
 
     /// Computes the contacts at an input; for a model without them a set with the local linear model as its bilateral part.
@@ -32,6 +33,8 @@ impl Model {
         *set = ContactSet::NONE;
         if self.has_contact_set() {
             self.contact_set(input, set)
+        } else if self.has_world_contacts() {
+            self.contact_sets(std::slice::from_ref(input), std::slice::from_mut(set))
         } else {
             set.has_field = 1;
             self.linear_field(input, &mut set.field)

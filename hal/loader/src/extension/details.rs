@@ -26,4 +26,16 @@ impl Model {
             self.calls.call(|instance| unsafe { read(instance, values.as_mut_ptr(), capacity) }),
         )
     }
+    /// Returns the error estimates of the model: each finite detail named `..._error`, known before the first step. Empty if the
+    /// model has none. Not real-time.
+    pub fn estimates(&mut self) -> Vec<(Detail, f64)> {
+        let details = self.details();
+        let mut values = vec![f64::NAN; details.len()];
+        if values.is_empty() || self.read_details(&mut values) != CallStatus::Ok {
+            return Vec::new();
+        }
+        let is_estimate =
+            |(detail, value): &(Detail, f64)| detail.id().ends_with("_error") && value.is_finite();
+        details.iter().copied().zip(values).filter(is_estimate).collect()
+    }
 }

@@ -18,6 +18,7 @@ pub(crate) mod snapshot;
 mod soft_range;
 mod workspace_bounds;
 mod world;
+mod world_contacts;
 
 use crate::LoadError;
 use crate::offers::Offers;
@@ -27,7 +28,7 @@ use flotor_hal::extension::{
     energy_ledger::EnergyLedgerTable, grip::GripTable, independent_stop::IndependentStopTable,
     linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable,
     soft_range::SoftRangeTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
-    world::WorldTable,
+    world::WorldTable, world_contacts::WorldContactsTable,
 };
 
 macro_rules! extensions {
@@ -66,6 +67,7 @@ extensions! {
         variant: VariantTable,
         workspace_bounds: WorkspaceBoundsTable,
         world: WorldTable,
+        world_contacts: WorldContactsTable,
     }
     DeviceExtensions {
         calibration: CalibrationTable,

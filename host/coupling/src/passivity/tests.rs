@@ -87,18 +87,18 @@ fn a_controller_lets_pass_what_takes_energy_and_what_there_is_energy_for() {
 }
 
 #[test]
-fn a_force_along_the_motion_has_the_energy_of_the_port_and_the_reserve_and_no_more() {
+fn a_force_along_the_motion_has_the_energy_of_the_port_and_half_the_reserve_and_no_more() {
     let mut controller = passivity(PassivityMode::Control);
     let push = Wrench::from_force(DVec3::Z * 0.5);
     let mut sent_n = |energy_j| {
         controller.energy_j = energy_j;
         controller.limit(&push, &push, &at(0.0, 0.1)).expect("it is too much").force().z
     };
-    let reserve_j = reserve_j(PERIOD_S);
+    let predicted_j = PREDICTED_SHARE * reserve_j(PERIOD_S);
     // Over a way of 0.1 mm.
-    assert!((0.0..=reserve_j / 1.0e-4).contains(&sent_n(0.0)));
+    assert!((0.0..=predicted_j / 1.0e-4).contains(&sent_n(0.0)));
     for energy_j in [1.0e-6, 1.0e-5] {
-        let most_n = (reserve_j + energy_j) / 1.0e-4;
+        let most_n = (predicted_j + energy_j) / 1.0e-4;
         let sent_n = sent_n(energy_j);
         assert!((0.9 * most_n..=most_n).contains(&sent_n), "{sent_n} N of {most_n} N");
     }
@@ -117,7 +117,7 @@ fn motion_along_an_axis_that_is_not_driven_does_not_count() {
     let kept = planar.limit(&push, &push, &state).expect("there is no energy for it").force();
     assert_eq!(kept.z, 0.0, "{kept}");
     let way = state.twist.linear() * PERIOD_S;
-    assert!(kept.dot(way) <= planar.reserve_j, "{kept} gives more energy than there is");
+    assert!(kept.dot(way) <= planar.predicted_j, "{kept} gives more energy than there is");
 }
 
 /// A force that the hand presses against from rest passes as a whole: one that assumed an acceleration of 50 m/s² deleted every

@@ -55,17 +55,25 @@ impl Engine {
         }
     }
 
-    /// Returns true if several devices can share the model; false outside the loop thread. Not real-time.
+    /// Returns true if several devices can share the model in the loop; false outside the loop thread. Not real-time.
     pub fn has_ports(&self) -> bool {
         matches!(self, Self::Here(model) if model.has_ports())
     }
 
-    /// Steps the model once for all its ports; `outputs` are only valid for [`Stepped::Answered`]. Returns [`Stepped::Broken`] for a
-    /// model without ports, and for a worker or asynchronous model. Real-time: bounded by the model, no allocation.
-    pub fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output]) -> Stepped {
+    /// Returns true if several devices can share the model once it runs asynchronously; false for one that already does, and in a
+    /// worker. Not real-time.
+    pub fn has_world_contacts(&self) -> bool {
+        matches!(self, Self::Here(model) if model.has_world_contacts())
+    }
+
+    /// Steps the model once for all its ports. Outputs are only valid if the result is [`Stepped::Answered`]; an asynchronous model
+    /// writes to `stepped` the result at each port, as of [`Self::step`]. Returns [`Stepped::Broken`] for a model without ports, and
+    /// for a worker. Real-time: bounded by the model, no allocation.
+    pub fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output], stepped: &mut [Stepped]) -> Stepped {
         match self {
             Self::Here(model) => model.step_ports(inputs, outputs).into(),
-            Self::Process(_) | Self::Asynchronous(_) => Stepped::Broken,
+            Self::Process(_) => Stepped::Broken,
+            Self::Asynchronous(model) => model.step_ports(inputs, outputs, stepped),
         }
     }
 
@@ -91,6 +99,12 @@ impl Engine {
     /// Returns the present value of a parameter; NaN if unknown. Not real-time.
     pub fn parameter(&mut self, index: usize) -> f64 {
         each!(self, model => model.parameter(index))
+    }
+
+    /// Returns the present values of all parameters of a model in the loop; none of any other. Not real-time.
+    pub fn parameters(&mut self) -> Vec<f64> {
+        let Self::Here(model) = self else { return Vec::new() };
+        (0..model.parameters().len()).map(|index| model.parameter(index)).collect()
     }
 
     /// Returns the outputs that the model can compute.
@@ -140,13 +154,13 @@ impl Engine {
         }
     }
 
-    /// Computes the contacts or the linear field at an input; `set` is only valid for [`Stepped::Answered`]. Returns
-    /// [`Stepped::Broken`] for an asynchronous model. Not real-time.
-    pub fn local_model(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
-        match self {
-            Self::Here(model) => model.local_model(input, set).into(),
-            Self::Process(worker) => worker.local_model(input, set),
-            Self::Asynchronous(_) => Stepped::Broken,
+    /// Computes the contacts or the linear field at the input of each port; `sets` are only valid for [`Stepped::Answered`]. Returns
+    /// [`Stepped::Broken`] for an asynchronous model, and for several ports of a worker. Not real-time.
+    pub fn local_models(&mut self, inputs: &[Input], sets: &mut [ContactSet]) -> Stepped {
+        match (self, inputs, sets) {
+            (Self::Here(model), inputs, sets) => model.local_models(inputs, sets).into(),
+            (Self::Process(worker), [input], [set]) => worker.local_model(input, set),
+            (Self::Process(_) | Self::Asynchronous(_), ..) => Stepped::Broken,
         }
     }
 
@@ -177,10 +191,10 @@ impl Engine {
         }
     }
 
-    /// Returns what the hand has felt of the stiffness of contacts, in the model frame. Real-time: bounded, no allocation.
-    pub fn felt_stiffness(&self) -> FeltStiffness {
+    /// Returns what the hand at a port has felt of the stiffness of contacts, in the model frame. Real-time: bounded, no allocation.
+    pub fn felt_stiffness(&self, port: usize) -> FeltStiffness {
         match self {
-            Self::Asynchronous(model) => model.felt_stiffness(),
+            Self::Asynchronous(model) => model.felt_stiffness(port),
             Self::Here(_) | Self::Process(_) => FeltStiffness::default(),
         }
     }

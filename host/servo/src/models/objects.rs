@@ -108,6 +108,10 @@ impl Body for Objects {
         worst
     }
 
+    fn parameters(&mut self) -> Vec<f64> {
+        self.objects.first_mut().map_or_else(Vec::new, |object| object.instance.model.parameters())
+    }
+
     fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
         let memory = self.memory;
         self.objects.iter_mut().map(move |object| object.instance.state(tick, memory))
@@ -115,11 +119,7 @@ impl Body for Objects {
 
     fn with_stiffness(&self, mut health: ModelHealth) -> ModelHealth {
         for Object { instance, placement, .. } in &self.objects {
-            let (felt, scale) = (instance.model.felt_stiffness(), placement.mapping.stiffness_scale());
-            let contacts = &mut health.contacts;
-            contacts.undamped_n_per_m = contacts.undamped_n_per_m.max(felt.undamped_n_per_m * scale);
-            let at_hand = felt.reduced_n_per_m.map(|pair| pair.map(|stiffness| stiffness * scale));
-            contacts.reduced_n_per_m = contacts.reduced_n_per_m.or(at_hand);
+            placement.note_stiffness(&instance.model.felt_stiffness(0), &mut health.contacts);
         }
         health
     }

@@ -2,7 +2,9 @@
 
 use super::contribution::{Contribution, Sample};
 use crate::engine::Engine;
+use flotor_contact::FeltStiffness;
 use flotor_core::end_wall::EndWall;
+use flotor_core::health::ContactHealth;
 use flotor_core::mapping::Mapping;
 use flotor_core::trace::Events;
 use flotor_hal::{Input, Output, SampledLoop, StepStatus};
@@ -25,6 +27,14 @@ impl Placement {
         if let Some(end) = &mut self.end {
             end.move_to(&model.workspace_bounds(), &self.mapping);
         }
+    }
+
+    /// Adds what the hand has felt of the stiffness of contacts, model frame, to the counters of the model. Not real-time.
+    pub(super) fn note_stiffness(&self, felt: &FeltStiffness, contacts: &mut ContactHealth) {
+        let scale = self.mapping.stiffness_scale();
+        contacts.undamped_n_per_m = contacts.undamped_n_per_m.max(felt.undamped_n_per_m * scale);
+        let at_hand = felt.reduced_n_per_m.map(|pair| pair.map(|stiffness| stiffness * scale));
+        contacts.reduced_n_per_m = contacts.reduced_n_per_m.or(at_hand);
     }
 
     /// Adds the usable output and effort of a step, model frame, to the contribution at the device, with the force of the wall.

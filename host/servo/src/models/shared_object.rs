@@ -2,7 +2,7 @@
 
 use super::body::{Body, Marks};
 use super::contribution::{Contribution, Sample, Share, usable};
-use super::instance::Instance;
+use super::instance::{Instance, Usable};
 use super::placement::Placement;
 use crate::engine::{Engine, Stepped};
 use flotor_core::health::ModelHealth;
@@ -45,7 +45,7 @@ impl Body for SharedObject {
     type Share = [Contribution; MAX_PORTS];
     type Marks = [Events; MAX_PORTS];
 
-    /// Steps the object once, for all its ports. An unusable output removes the force of its port only.
+    /// Steps the object once, for all its ports. An unusable output, or none in time, removes the force of its port only.
     fn step(
         &mut self,
         tick: &Tick,
@@ -63,16 +63,23 @@ impl Body for SharedObject {
             *input = port.mapping.input(tick, sample.state, sample.demand.computed().limited_to(*serves));
         }
         outputs.fill(Output::default());
-        if instance.model.step_ports(inputs, outputs) != Stepped::Answered {
+        let mut stepped = [Stepped::Answered; MAX_PORTS];
+        if instance.model.step_ports(inputs, outputs, &mut stepped) != Stepped::Answered {
             instance.fail(tick.index, health);
             events.mark(Events::MODEL_FAULT);
             return shares;
         }
         let mut is_rejected = false;
         let answers = ports.iter().zip(inputs.iter().zip(&**outputs)).zip(samples.iter().flatten());
-        for (((port, (input, output)), sample), (share, events)) in
-            answers.zip(shares.iter_mut().zip(events.iter_mut()))
+        for ((((port, (input, output)), sample), stepped), (share, events)) in
+            answers.zip(stepped).zip(shares.iter_mut().zip(events.iter_mut()))
         {
+            if stepped != Stepped::Answered
+                && !matches!(instance.count(stepped, tick.index, health), Usable::Output)
+            {
+                events.insert(Events::MODEL_OVERRUN);
+                continue;
+            }
             let at_grip = |grip| instance.model.grip(input, &port.mapping.grip_to_model(grip));
             let effort = sample.grip.map_or(0.0, at_grip);
             match usable(sample.demand, *output).filter(|_| effort.is_finite()) {
@@ -107,12 +114,18 @@ impl Body for SharedObject {
         status
     }
 
+    fn parameters(&mut self) -> Vec<f64> {
+        self.instance.model.parameters()
+    }
+
     fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
         std::iter::once(self.instance.state(tick, self.memory))
     }
 
-    /// Adds nothing: a shared model runs in the loop, so its contacts are its own.
-    fn with_stiffness(&self, health: ModelHealth) -> ModelHealth {
+    fn with_stiffness(&self, mut health: ModelHealth) -> ModelHealth {
+        for (number, port) in self.ports.iter().enumerate() {
+            port.note_stiffness(&self.instance.model.felt_stiffness(number), &mut health.contacts);
+        }
         health
     }
 

@@ -44,7 +44,7 @@ pub(super) fn read(
         section.finish()?;
         if !on.contains(&device) || own.iter().any(|(of, ..)| *of == device) {
             return Err(
-                here.problem("a `model.port` is on a device of the model, and each device has one at most")
+                here.problem("each `model.port` needs a different device of the model; correct its `device`")
             );
         }
         own.push((device, config, places_m));
@@ -56,9 +56,6 @@ impl Sharing {
     /// Returns the model, shared by the devices `on`: each has the mapping of its port, or that of the model.
     pub(super) fn of(self, model: ModelUse, on: &[u16]) -> Result<ModelUse, SceneError> {
         let wrong = |problem: &str| Err(self.location.problem(problem));
-        if model.field.is_some() {
-            return wrong("a shared model runs in the loop: remove `[model.field]`, or `shared`");
-        }
         if model.isolation == Isolation::Process {
             return wrong("a shared model runs in the host process: remove `isolation`, or `shared`");
         }
@@ -72,9 +69,9 @@ impl Sharing {
                     "a shared model has one position on each device: remove `positions_mm` and `grid`",
                 );
             };
-            ports.push(PortConfig { device: *device, mapping, place_m });
+            ports.push(PortConfig { device: *device, mapping, place_m, contacts: None });
         }
-        let PortConfig { device, mapping, place_m } = ports.remove(0); // there are two or more
+        let PortConfig { device, mapping, place_m, .. } = ports.remove(0); // there are two or more
         Ok(ModelUse { device, mapping, places_m: vec![place_m], shared_with: ports, ..model })
     }
 }

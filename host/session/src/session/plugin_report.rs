@@ -38,7 +38,7 @@ pub struct PluginReport {
     /// Signals of the host that the plugin blocked, or whose actions the plugin replaced, during its creation; the host has
     /// restored these signals.
     pub signals_taken: TakenSignals,
-    /// Error estimates of a model ([`crate::estimates`]): id and value of each.
+    /// Error estimates of a model ([`flotor_loader::Model::estimates`]): id and value of each.
     pub estimates: Vec<(String, f64)>,
 }
 

@@ -3,7 +3,6 @@
 use super::{PluginReport, RunError, StopWithoutHost};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, CallThread, Progress, is_to_begin, keeping_machine, limit};
-use crate::estimates;
 use crate::registry::{LookupError, Registry, is_installed};
 use crate::scene::{
     CalibrationUse, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
@@ -178,18 +177,21 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
     let mut scene = scene.clone();
     let period_s = 1.0 / scene.rate_hz;
     for model in &mut scene.models {
-        let number = usize::from(model.device);
         let on = model.devices();
-        let damping_ns_per_m = scene.devices.get(number).map_or(0.0, |used| used.damping_ns_per_m);
         let devices = || on.iter().filter_map(|number| opened.get(*number));
         let is_simulated = devices().all(|device| device.embodiment == Embodiment::Simulated);
         if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
             model.isolation = Isolation::None;
         }
         model.latency_s = devices().map(|device| device.capabilities.latency_s).fold(0.0, f64::max);
-        if let (Some(field), Some(Opened { capabilities, .. })) = (&mut model.field, opened.get(number)) {
-            field.contacts = field.contacts.on(capabilities, damping_ns_per_m, &scene.limits, period_s);
-        }
+        let Some(field) = &mut model.field else { continue };
+        let limits = field.contacts;
+        let contacts_on = |device: u16| {
+            let (used, opened) = (scene.devices.get(usize::from(device))?, opened.get(usize::from(device))?);
+            Some(limits.on(&opened.capabilities, used.damping_ns_per_m, &scene.limits, period_s))
+        };
+        model.shared_with.iter_mut().for_each(|port| port.contacts = contacts_on(port.device));
+        field.contacts = contacts_on(model.device).unwrap_or(limits);
     }
     scene
 }
@@ -265,7 +267,7 @@ impl ModelBuilder {
         let further: Vec<Mapping> = further.collect();
         let instance = |place_m: &[f64; 3]| {
             let mapping = mapping.at(*place_m);
-            let mut engine = self.engine(&mapping, budget_ns, progress)?;
+            let mut engine = self.engine((&mapping, &further), budget_ns, progress)?;
             let bounds = engine.workspace_bounds();
             let mut mappings = std::iter::once(&mapping).chain(&further);
             if let Some(excluded) = mappings.find(|mapping| pushes_at_home(&bounds, mapping)) {
@@ -282,7 +284,7 @@ impl ModelBuilder {
         let mut value = |index| instances.first_mut().map_or(f64::NAN, |(first, _)| first.parameter(index));
         let values = (0..plugin.parameters().len()).map(&mut value).collect();
         let estimates = match instances.first_mut() {
-            Some((Engine::Here(model), _)) => estimates(model),
+            Some((Engine::Here(model), _)) => model.estimates(),
             _ => Vec::new(), // a worker returns wrenches only
         };
         let estimates =
@@ -301,10 +303,10 @@ impl ModelBuilder {
         Ok((layer, values, estimates))
     }
 
-    /// Creates and prepares one instance: in the loop, in a worker, or asynchronous.
+    /// Creates and prepares one instance: in the loop, in a worker, or asynchronous, for its port and the `further` ones.
     fn engine(
         &self,
-        mapping: &Mapping,
+        (mapping, further): (&Mapping, &[Mapping]),
         budget_ns: Option<u64>,
         progress: &Progress,
     ) -> Result<Engine, RunError> {
@@ -329,10 +331,16 @@ impl ModelBuilder {
             }
             Isolation::ByOrigin | Isolation::None => Engine::Here(plugin.create_model(settings)?),
         };
-        if !model.shared_with.is_empty() && !engine.has_ports() {
-            let problem = "the plugin cannot be shared: it does not offer `flotor.world/1`; remove `shared` to give each device an \
-                           instance of its own";
-            return Err(complain(model, problem).into());
+        let (can_share, lacks) = match model.field {
+            None => (engine.has_ports(), "flotor.world/1"),
+            Some(_) => (engine.has_world_contacts(), "flotor.world-contacts/1"),
+        };
+        if !model.shared_with.is_empty() && !can_share {
+            let problem = format!(
+                "the plugin cannot be shared: it does not offer `{lacks}`; remove `shared` to give each device an instance of \
+                 its own"
+            );
+            return Err(complain(model, &problem).into());
         }
         let Some(timing) = &model.field else {
             progress.enter(&model.name, Call::Prepare);
@@ -345,7 +353,10 @@ impl ModelBuilder {
         }
         progress.enter(&model.name, Call::Prepare);
         let parameters = plugin.parameters().len();
-        let slow = AsynchronousModel::start(engine, parameters, (timing, mapping), config, *clock);
+        let limits = model.shared_with.iter().map(|port| port.contacts.as_ref().unwrap_or(&timing.contacts));
+        let ports: Vec<_> =
+            std::iter::once((mapping, &timing.contacts)).chain(further.iter().zip(limits)).collect();
+        let slow = AsynchronousModel::start(engine, parameters, (timing, &ports), config, *clock);
         Ok(Engine::Asynchronous(Box::new(slow.map_err(no)?)))
     }
 }

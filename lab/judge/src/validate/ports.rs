@@ -1,24 +1,34 @@
-//! Check of an object that several devices share: one port repeats a step, and ports do not disturb each other.
+//! Check of an object that several devices share: one port repeats a step or a contact set, and ports do not disturb each other.
 
 use super::outcome::Outcome;
 use super::path::{step, walk};
 use super::subject::Subject;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DVec3, Demand, Input, MAX_PORTS, Output, Pose};
+use flotor_hal::{ContactSet, DVec3, Demand, Input, MAX_PORTS, Output, Pose};
 use flotor_loader::Model;
 
 /// Steps of each check.
 const STEPS: u64 = 1000;
+/// Contact sets of each check, and the time between two of them, ns.
+const CONTACT_SETS: u64 = 100;
+const SLOW_NS: u64 = 5_000_000;
 /// Distance between the handles of two ports, m: near enough for one object between all of them.
 const APART_M: f64 = 2.0e-3;
 
 pub(super) fn ports(subject: &Subject) -> Result<(), Outcome> {
     let (mut model, mut other) = (subject.prepared_model()?, subject.prepared_model()?);
+    if model.has_world_contacts() {
+        contacts(&mut subject.prepared_model()?, &mut subject.prepared_model()?)?;
+    }
     if !model.has_ports() {
-        return Err(Outcome::nothing_to_judge(
-            "the model does not offer `flotor.world/1`: each device has an instance of its own",
-        ));
+        return if model.has_world_contacts() {
+            Ok(())
+        } else {
+            Err(Outcome::nothing_to_judge(
+                "the model does not offer `flotor.world/1`: each device has an instance of its own",
+            ))
+        };
     }
     for input in walk(STEPS) {
         let (alone, [at_port, ..]) = (step(&mut other, &input)?, step_ports(&mut model, &[input])?);
@@ -51,6 +61,67 @@ pub(super) fn ports(subject: &Subject) -> Result<(), Outcome> {
         })?;
     }
     Ok(())
+}
+
+/// Checks the contacts of an asynchronous object: those at one port are those of a contact set, and every port has a valid set, also
+/// while the pose at another is not finite.
+fn contacts(model: &mut Model, other: &mut Model) -> Result<(), Outcome> {
+    for input in walk(CONTACT_SETS).map(|input| Input { dt_ns: SLOW_NS * u64::from(input.tick > 0), ..input })
+    {
+        let [at_port, ..] = *contact_sets(model, &[input])?;
+        let mut alone = ContactSet::NONE;
+        if other.has_contact_set()
+            && other.contact_set(&input, &mut alone) == CallStatus::Ok
+            && alone != at_port
+        {
+            return Err(Outcome::Violation(format!(
+                "at tick {} one port has other contacts than contact-set; return the same bits for one port",
+                input.tick
+            )));
+        }
+    }
+    for count in 2..=MAX_PORTS {
+        if model.reset() != CallStatus::Ok {
+            return Err(Outcome::Violation("reset failed before the contacts of several ports".to_owned()));
+        }
+        for input in walk(CONTACT_SETS) {
+            let inputs: Vec<Input> = (0..count)
+                .map(|port| {
+                    let position_m = match (port, input.tick % 7) {
+                        (0, 3) => DVec3::NAN,
+                        _ => input.pose.position() + DVec3::X * (APART_M * port as f64),
+                    };
+                    let dt_ns = SLOW_NS * u64::from(input.tick > 0);
+                    Input { pose: Pose::new(position_m, input.pose.orientation()), dt_ns, ..input }
+                })
+                .collect();
+            let sets = contact_sets(model, &inputs)?;
+            for (port, set) in sets.iter().take(count).enumerate() {
+                let is_finite = set.bilateral().is_finite();
+                // Any period: how long a set is valid does not make it right or wrong.
+                let problem =
+                    flotor_contact::ContactSet::published(set, 1.0).err().map(|error| error.to_string());
+                let problem = problem.or((!is_finite).then(|| "its bilateral part is not finite".to_owned()));
+                if let Some(problem) = problem {
+                    return Err(Outcome::Violation(format!(
+                        "at tick {} the contacts at port {port} of {count} (from 0): {problem}; return a valid set at every port, \
+                         also while the pose at another is not finite",
+                        input.tick
+                    )));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Computes the contacts at all ports.
+fn contact_sets(model: &mut Model, inputs: &[Input]) -> Result<Box<[ContactSet; MAX_PORTS]>, String> {
+    let mut sets = Box::new([ContactSet::NONE; MAX_PORTS]);
+    match model.contact_sets(inputs, &mut sets[..inputs.len()]) {
+        CallStatus::Ok => Ok(sets),
+        status => Err(format!("the contacts of {} ports failed: {}", inputs.len(), model.reason(status))),
+    }
 }
 
 /// Steps a reset model along a walk at each of several ports; `change` changes the input of a port.

@@ -10,37 +10,31 @@
 //! On a real clock the model runs in a thread of its own, and neither side waits: without a new answer the loop continues with the
 //! old one, up to an age limit. On the virtual clock the model is computed in the loop's tick, at multiples of the model's period,
 //! and each answer is delayed by the latency in the scene: all runs are identical, bit for bit.
+//!
+//! A model that several devices share has one instance and a port for each device: its thread takes the newest input of every port,
+//! and the contacts of each port are solved at that port.
 
-mod contacts;
+mod inline;
 mod source;
 mod thread;
 
 use crate::{Clock, Engine, Stepped};
-use contacts::contacts;
-use flotor_contact::{ContactSetError, CrossFade, FeltStiffness, PublishedContacts};
-use flotor_core::asynchronous::FieldTiming;
+use flotor_contact::{ContactSetError, FeltStiffness, NewestAnswer};
+use flotor_core::asynchronous::{ContactLimits, FieldTiming};
 use flotor_core::mapping::Mapping;
 use flotor_core::{period_ns, to_ns};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, StepStatus, Wrench};
-use source::Source;
+use flotor_hal::{ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, StepStatus};
+use inline::Inline;
 use thread::ModelThread;
-
-/// Age limit of an answer, in periods of the model: later the handle may have moved too far from the sample.
-const OLDEST_PERIODS: u64 = 10;
 
 /// Model with a rate below the loop's; the loop evaluates the model's newest answers.
 pub struct AsynchronousModel {
     computing: Computing,
-    contacts: PublishedContacts,
-    fields: CrossFade,
+    /// Newest answer at each port.
+    answers: Box<[NewestAnswer]>,
     /// Reason for which the last contacts were refused, if any were.
     refused: Option<ContactSetError>,
-    /// Sample time of the newest answer, ns; `None` before the first answer.
-    newest_ns: Option<u64>,
-    /// Time of the first step since the last reset, ns.
-    since_ns: Option<u64>,
-    oldest_ns: u64,
     serves: Demand,
     memory: Memory,
     /// Present value of each parameter.
@@ -61,8 +55,8 @@ impl AsynchronousModel {
         LoopConfig { period_ns: period_ns(timing.rate_hz).max(config.period_ns), ..*config }
     }
 
-    /// Prepares the model for its own rate ([`Self::config`]) and starts it, inline or on a thread; `mapping` is that of its
-    /// instance. Not real-time.
+    /// Prepares the model for its own rate ([`Self::config`]) and starts it, inline or on a thread; `ports` has the mapping
+    /// and the limits of each device: one, or those that share the model. Not real-time.
     ///
     /// # Errors
     /// The model's [`Refusal`], a refusal with the cause if the system cannot start a thread, or one for a limit of contacts that is not
@@ -70,85 +64,99 @@ impl AsynchronousModel {
     pub fn start(
         mut model: Engine,
         parameters: usize,
-        (timing, mapping): (&FieldTiming, &Mapping),
+        (timing, ports): (&FieldTiming, &[(&Mapping, &ContactLimits)]),
         config: &LoopConfig,
         clock: Clock,
     ) -> Result<Self, Refusal> {
         let latency_ns = to_ns(timing.latency_s);
         let loop_ns = config.period_ns;
         let config = Self::config(timing, config);
-        let contacts = contacts(&timing.contacts, mapping, [loop_ns, config.period_ns])?;
         let period_ns = config.period_ns;
+        let answer = |(mapping, limits): &(&Mapping, &ContactLimits)| {
+            let answer = NewestAnswer::new(mapping, limits, [loop_ns, period_ns]);
+            answer.map_err(|error| Refusal::parameter(format!("contacts: {error}")))
+        };
+        let answers = ports.iter().map(answer).collect::<Result<_, Refusal>>()?;
         model.prepare(&config)?;
         let parameters = (0..parameters).map(|index| model.parameter(index)).collect();
         let (serves, memory) = (model.serves(), model.memory());
         let computing = match clock {
-            Clock::Virtual => Computing::Inline(Box::new(Inline::new(model, period_ns, latency_ns))),
-            Clock::Real => Computing::Thread(ModelThread::start(model, period_ns)?),
+            Clock::Virtual => {
+                Computing::Inline(Box::new(Inline::new(model, ports.len(), [period_ns, latency_ns])))
+            }
+            Clock::Real => Computing::Thread(ModelThread::start(model, ports.len(), period_ns)?),
         };
-        Ok(Self {
-            computing,
-            contacts,
-            fields: CrossFade::new(period_ns),
-            refused: None,
-            newest_ns: None,
-            since_ns: None,
-            oldest_ns: OLDEST_PERIODS * period_ns,
-            serves,
-            memory,
-            parameters,
-        })
+        Ok(Self { computing, answers, refused: None, serves, memory, parameters })
     }
 
-    /// Evaluates the newest contacts and fields at the handle; `output` is only valid for [`Stepped::Answered`], [`Stepped::Short`] and
-    /// [`Stepped::Refused`], and its energy is NaN. Returns [`Stepped::Silent`] after ten periods of the model without an answer, once
-    /// contacts have faded. Real-time on a real clock: bounded, no allocation.
+    /// Evaluates the newest contacts and fields at the handle, as [`Self::step_ports`] at its only port. Real-time on a real clock:
+    /// bounded, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
+        match self.begin(std::slice::from_ref(input)) {
+            Stepped::Late => self.step_port(0, input, output),
+            stepped => stepped,
+        }
+    }
+
+    /// Evaluates the newest contacts and fields at every port, and writes the result at each to `stepped`. An output is only valid for
+    /// [`Stepped::Answered`], [`Stepped::Short`] and [`Stepped::Refused`], and its energy is NaN. At a port the result is
+    /// [`Stepped::Silent`] after ten periods of the model without an answer, once contacts have faded. Returns [`Stepped::Broken`] for
+    /// a model that has failed. Real-time on a real clock: bounded, no allocation.
+    pub fn step_ports(
+        &mut self,
+        inputs: &[Input],
+        outputs: &mut [Output],
+        stepped: &mut [Stepped],
+    ) -> Stepped {
+        if let stepped @ Stepped::Broken = self.begin(inputs) {
+            return stepped;
+        }
+        for (port, ((input, output), stepped)) in inputs.iter().zip(outputs).zip(stepped).enumerate() {
+            *stepped = self.step_port(port, input, output);
+        }
+        Stepped::Answered
+    }
+
+    /// Passes the inputs of all ports to the model; returns late, or [`Stepped::Broken`] for a model that has failed.
+    fn begin(&mut self, inputs: &[Input]) -> Stepped {
+        match &mut self.computing {
+            Computing::Inline(inline) => inline.begin(inputs),
+            Computing::Thread(thread) => thread.begin(inputs),
+        }
+    }
+
+    fn step_port(&mut self, port: usize, input: &Input, output: &mut Output) -> Stepped {
+        let Some(answer) = self.answers.get_mut(port) else { return Stepped::Broken };
         let mut set = ContactSet::NONE;
         let polled = match &mut self.computing {
-            Computing::Inline(inline) => inline.poll(input, &mut set),
-            Computing::Thread(thread) => thread.poll(input, &mut set),
+            Computing::Inline(inline) => inline.newest(port, &mut set),
+            Computing::Thread(thread) => thread.newest(port, &mut set),
         };
-        let (field, mut stepped) = (set.bilateral(), Stepped::Answered);
-        match polled {
-            Stepped::Answered if !field.is_finite() => {
+        let mut stepped = Stepped::Answered;
+        if polled == Stepped::Answered {
+            let field = set.bilateral();
+            if !field.is_finite() {
                 // Returned, to be rejected as a non-finite output.
                 *output = field.wrench.into();
-                return Stepped::Answered;
+                return stepped;
             }
-            Stepped::Answered => match self.contacts.publish(&set) {
-                Ok(()) => {
-                    self.fields.take(field, &input.pose, input.time_ns);
-                    self.newest_ns = Some(set.time_ns);
-                }
-                Err(error) => (self.refused, stepped) = (Some(error), Stepped::Refused),
-            },
-            Stepped::Broken | Stepped::Gone => return Stepped::Broken,
-            _ => {}
-        }
-        let since_ns = *self.since_ns.get_or_insert(input.time_ns);
-        let age_ns = input.time_ns.saturating_sub(self.newest_ns.unwrap_or(since_ns));
-        let is_old = age_ns > self.oldest_ns;
-        if is_old && self.contacts.is_idle() {
-            return Stepped::Silent;
-        }
-        let (mut wrench, mut is_valid) =
-            if is_old { (Wrench::ZERO, false) } else { self.fields.at(&input.pose, input.time_ns) };
-        if let Some(touch) = self.contacts.touch(input) {
-            wrench = wrench + touch.wrench;
-            is_valid &= touch.is_valid;
-            if let (Stepped::Answered, Some(shortcoming)) = (stepped, touch.shortcoming) {
-                stepped = Stepped::Short(shortcoming);
+            if let Err(error) = answer.take(&set, input) {
+                (self.refused, stepped) = (Some(error), Stepped::Refused);
             }
         }
-        let status = if is_valid { StepStatus::Ok } else { StepStatus::Clamped };
-        *output = Output::new(wrench, f64::NAN, status);
+        let Some(touch) = answer.touch(input) else { return Stepped::Silent };
+        if let (Stepped::Answered, Some(shortcoming)) = (stepped, touch.shortcoming) {
+            stepped = Stepped::Short(shortcoming);
+        }
+        let status = if touch.is_valid { StepStatus::Ok } else { StepStatus::Clamped };
+        *output = Output::new(touch.wrench, f64::NAN, status);
         stepped
     }
 
-    /// Returns what the hand has felt of the stiffness of contacts so far, in the model frame. Real-time: bounded, no allocation.
-    pub fn felt_stiffness(&self) -> FeltStiffness {
-        self.contacts.felt_stiffness()
+    /// Returns what the hand at a port has felt of the stiffness of contacts so far, in the model frame. Real-time: bounded, no
+    /// allocation.
+    pub fn felt_stiffness(&self, port: usize) -> FeltStiffness {
+        self.answers.get(port).map(NewestAnswer::felt_stiffness).unwrap_or_default()
     }
 
     /// Changes a live parameter before the next answer; unsupported if the thread's queue is full. Real-time: bounded, no allocation.
@@ -180,9 +188,7 @@ impl AsynchronousModel {
 
     /// Clears the history of the model and its answers: without force until the next answer. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
-        self.contacts.clear();
-        self.fields.clear();
-        (self.newest_ns, self.since_ns) = (None, None);
+        self.answers.iter_mut().for_each(NewestAnswer::clear);
         match &mut self.computing {
             Computing::Inline(inline) => inline.reset(),
             Computing::Thread(thread) => thread.reset(),
@@ -198,45 +204,5 @@ impl AsynchronousModel {
             Computing::Inline(inline) => inline.source.model.last_message(),
             Computing::Thread(thread) => thread.last_message(),
         }
-    }
-}
-
-/// Model computed in the tick of the loop at multiples of the model's period, with delayed answers.
-struct Inline {
-    source: Source,
-    period_ns: u64,
-    latency_ns: u64,
-    /// Time of the next computation, ns.
-    next_ns: u64,
-    /// Computed answer with its release time, ns. A latency is at most a period, so there is at most one answer.
-    held_back: Option<(u64, ContactSet)>,
-}
-
-impl Inline {
-    fn new(model: Engine, period_ns: u64, latency_ns: u64) -> Self {
-        Self { source: Source::new(model), period_ns, latency_ns, next_ns: 0, held_back: None }
-    }
-
-    /// Computes an answer if one is due, and copies the answer whose latency is over to `set`; returns late if there is none.
-    fn poll(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
-        let due = self.held_back.take_if(|(ready_ns, _)| input.time_ns >= *ready_ns);
-        if input.time_ns >= self.next_ns {
-            self.next_ns = (input.time_ns / self.period_ns + 1) * self.period_ns;
-            let mut next = ContactSet::NONE;
-            match self.source.compute(input, &mut next) {
-                Stepped::Answered => self.held_back = Some((input.time_ns + self.latency_ns, next)),
-                Stepped::Broken | Stepped::Gone => return Stepped::Broken,
-                // The next computation may yield an answer.
-                _ => {}
-            }
-        }
-        let Some((_, due)) = due else { return Stepped::Late };
-        *set = due;
-        Stepped::Answered
-    }
-
-    fn reset(&mut self) -> CallStatus {
-        self.held_back = None;
-        self.source.reset()
     }
 }

@@ -1,13 +1,13 @@
 //! Model in a thread of its own, at its own rate.
 //!
-//! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
+//! Loop and thread share two latest-value cells for each port, a queue of commands and two flags; neither waits for the other.
 
 use super::source::Source;
 use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
 use flotor_core::sent::{INPUT_WORDS, SentInput, SentSet};
 use flotor_core::words::CONTACT_SET_WORDS;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{ContactSet, Input, Pose, Refusal};
+use flotor_hal::{ContactSet, Input, MAX_PORTS, Pose, Refusal};
 use flotor_sync::{Observer, Publisher, latest};
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,33 +32,41 @@ struct Flags {
     last_words: OnceLock<String>,
 }
 
-/// Loop side of the model thread; dropping it ends the thread after the current answer.
-pub(super) struct ModelThread {
+/// Loop side of a port.
+struct PortCells {
     samples: Publisher<SentInput, INPUT_WORDS>,
     sets: Observer<SentSet, CONTACT_SET_WORDS>,
-    operations: Producer<Operation>,
-    flags: Arc<Flags>,
     /// Version of the newest set taken.
     taken: u64,
+}
+
+/// Loop side of the model thread; dropping it ends the thread after the current answer.
+pub(super) struct ModelThread {
+    ports: Box<[PortCells]>,
+    operations: Producer<Operation>,
+    flags: Arc<Flags>,
     /// Time of the last reset, ns; sets of older samples are dropped.
     forgotten_ns: u64,
     now_ns: u64,
 }
 
 impl ModelThread {
-    /// Starts a thread that computes a set each period while samples arrive. Not real-time.
+    /// Starts a thread that computes a set for each of its ports each period while samples arrive. Not real-time.
     ///
     /// # Errors
     /// If the system cannot start a thread.
-    pub(super) fn start(model: Engine, period_ns: u64) -> Result<Self, Refusal> {
-        let (samples, seen) = latest(SentInput(Input::at_rest(Pose::HOME)));
-        let (sent, sets) = latest(SentSet(ContactSet::NONE));
+    pub(super) fn start(model: Engine, ports: usize, period_ns: u64) -> Result<Self, Refusal> {
+        let cells = || {
+            let (samples, seen) = latest(SentInput(Input::at_rest(Pose::HOME)));
+            let (sent, sets) = latest(SentSet(ContactSet::NONE));
+            (PortCells { samples, sets, taken: 0 }, (seen, sent))
+        };
+        let (ports, computed): (Vec<_>, Vec<_>) = (0..ports.min(MAX_PORTS)).map(|_| cells()).unzip();
         let (operations, pending) = RingBuffer::new(OPERATIONS);
         let flags = Arc::new(Flags::default());
         let computer = Computer {
             source: Source::new(model),
-            samples: seen,
-            sets: sent,
+            ports: computed,
             operations: pending,
             flags: Arc::clone(&flags),
         };
@@ -70,20 +78,27 @@ impl ModelThread {
                 "cannot start a thread for an asynchronous model: {error}; {THREAD_ADVICE}"
             ))
         })?;
-        Ok(Self { samples, sets, operations, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
+        Ok(Self { ports: ports.into(), operations, flags, forgotten_ns: 0, now_ns: 0 })
     }
 
-    /// Publishes the input and copies a new set to `set`; returns late if there is none. Real-time: bounded, no allocation.
+    /// Publishes the input of each port; returns [`Stepped::Broken`] for a failed model, otherwise late. Real-time: bounded, no
+    /// allocation.
     #[inline]
-    pub(super) fn poll(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
-        self.samples.publish(&SentInput(*input));
-        self.now_ns = input.time_ns;
-        if self.flags.is_broken.load(Ordering::Acquire) {
-            return Stepped::Broken;
+    pub(super) fn begin(&mut self, inputs: &[Input]) -> Stepped {
+        for (port, input) in self.ports.iter_mut().zip(inputs) {
+            port.samples.publish(&SentInput(*input));
+            self.now_ns = input.time_ns;
         }
-        match self.sets.read_after(self.taken) {
+        if self.flags.is_broken.load(Ordering::Acquire) { Stepped::Broken } else { Stepped::Late }
+    }
+
+    /// Copies a new set of a port to `set`; returns late if there is none. Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn newest(&mut self, port: usize, set: &mut ContactSet) -> Stepped {
+        let Some(port) = self.ports.get_mut(port) else { return Stepped::Late };
+        match port.sets.read_after(port.taken) {
             Some((version, SentSet(newest))) => {
-                self.taken = version;
+                port.taken = version;
                 *set = newest;
                 if newest.time_ns < self.forgotten_ns { Stepped::Late } else { Stepped::Answered }
             }
@@ -121,8 +136,8 @@ impl Drop for ModelThread {
 /// Thread side: model and ends of the shared cells and queue.
 struct Computer {
     source: Source,
-    samples: Observer<SentInput, INPUT_WORDS>,
-    sets: Publisher<SentSet, CONTACT_SET_WORDS>,
+    /// Newest input of each port, and the way of its sets.
+    ports: Vec<(Observer<SentInput, INPUT_WORDS>, Publisher<SentSet, CONTACT_SET_WORDS>)>,
     operations: Consumer<Operation>,
     flags: Arc<Flags>,
 }
@@ -133,13 +148,7 @@ impl Computer {
         let (mut deadline, mut seen) = (Instant::now(), 0);
         while !self.flags.is_over.load(Ordering::Acquire) {
             let executed = self.execute();
-            let answered = match self.samples.read() {
-                Some((version, SentInput(input))) if version > seen => {
-                    seen = version;
-                    self.answer(&input)
-                }
-                _ => CallStatus::Ok,
-            };
+            let answered = self.answer(&mut seen);
             if executed == CallStatus::Panicked || answered != CallStatus::Ok {
                 let _ = self.flags.last_words.set(self.source.model.last_message());
                 self.flags.is_broken.store(true, Ordering::Release);
@@ -166,11 +175,30 @@ impl Computer {
         worst
     }
 
-    fn answer(&mut self, input: &Input) -> CallStatus {
-        let mut set = ContactSet::NONE;
-        match self.source.compute(input, &mut set) {
+    /// Computes and publishes a set for each port, if the last port has a newer input than the one numbered `seen`.
+    fn answer(&mut self, seen: &mut u64) -> CallStatus {
+        let (mut inputs, mut newest) = ([Input::at_rest(Pose::HOME); MAX_PORTS], None);
+        for ((samples, _), input) in self.ports.iter_mut().zip(&mut inputs) {
+            newest = samples.read();
+            if let Some((_, SentInput(sample))) = newest {
+                *input = sample;
+            }
+        }
+        // The loop publishes the last port last: every port has had an input by then.
+        match newest {
+            Some((version, _)) if version > *seen => *seen = version,
+            _ => return CallStatus::Ok,
+        }
+        let mut sets = [ContactSet::NONE; MAX_PORTS];
+        let count = self.ports.len();
+        let (Some(inputs), Some(sets)) = (inputs.get(..count), sets.get_mut(..count)) else {
+            return CallStatus::Ok; // there are at most so many ports
+        };
+        match self.source.compute(inputs, sets) {
             Stepped::Answered => {
-                self.sets.publish(&SentSet(set));
+                for ((_, published), set) in self.ports.iter_mut().zip(sets) {
+                    published.publish(&SentSet(*set));
+                }
                 CallStatus::Ok
             }
             Stepped::Broken | Stepped::Gone => CallStatus::Panicked,
