@@ -33,11 +33,7 @@ impl NewestAnswer {
     ///
     /// # Errors
     /// If a limit is not above 0.
-    pub fn new(
-        mapping: &Mapping,
-        limits: &ContactLimits,
-        periods_ns: [u64; 2],
-    ) -> Result<Self, NotPositive> {
+    pub fn new(mapping: &Mapping, limits: &ContactLimits, periods_ns: [u64; 2]) -> Result<Self, NotPositive> {
         let [loop_s, model_s] = periods_ns.map(|period_ns| period_ns as f64 * 1.0e-9);
         let cap = limits.cap.unwrap_or(StiffnessCap::UNKNOWN);
         // Stiffness and damping have the same scale.
@@ -93,13 +89,13 @@ impl NewestAnswer {
         })
     }
 
-    /// Returns what the hand has felt of the stiffness of contacts so far. Real-time: bounded, no allocation.
+    /// Returns the reductions of contact stiffness so far. Real-time: bounded, no allocation.
     #[must_use]
     pub fn felt_stiffness(&self) -> FeltStiffness {
         self.contacts.felt_stiffness()
     }
 
-    /// Forgets all answers: without force until the next. Real-time: bounded, no allocation.
+    /// Removes all answers: no force until the next one. Real-time: bounded, no allocation.
     pub fn clear(&mut self) {
         self.contacts.clear();
         self.fields.clear();

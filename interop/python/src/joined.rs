@@ -1,4 +1,4 @@
-//! Run that somebody else has started: observed and changed over its socket.
+//! Run of another program, observed and changed over its socket.
 
 use crate::error::refuse;
 use crate::state::State;
@@ -10,9 +10,9 @@ use std::collections::HashMap;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
-/// Longest wait for an answer: a swap creates a model first.
+/// Timeout for an answer; a swap first creates a model.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Time between two looks for signals of Python, such as Ctrl-C, and for the end of the connection.
+/// Poll interval for Python's signals, such as Ctrl-C, and for the end of the connection.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Run of another program; the package wraps it in `flotor.JoinedRun`.
@@ -26,19 +26,19 @@ pub(crate) struct JoinedRun {
     models: Vec<String>,
 }
 
-/// What the run has sent, shared with the thread that receives it.
+/// Received data of the run, shared with the receiving thread.
 #[derive(Default)]
 struct Received {
     now: Mutex<Now>,
     arrived: Condvar,
 }
 
-/// Newest of what the run has sent.
+/// Newest received data of the run.
 #[derive(Default)]
 struct Now {
     /// Newest record of each device, by its number.
     newest: Vec<Option<TickRecord>>,
-    /// Answers that nobody has taken yet, by the number of the request.
+    /// Unread answers, by request number.
     answers: HashMap<u64, Option<String>>,
     /// Sentence of the end, and true if the run ended in order; the reason if the connection has ended before.
     end: Option<(String, bool)>,
@@ -161,7 +161,8 @@ impl JoinedRun {
         }
     }
 
-    /// Waits until `look` finds something, the run has ended, or a time has come; looks for signals of Python meanwhile.
+    /// Polls `look` until it returns a value, the run has ended, or a deadline has passed; handles Python's signals while
+    /// waiting.
     fn wait<T: Send>(
         &self,
         py: Python<'_>,
@@ -189,7 +190,7 @@ impl JoinedRun {
         }
     }
 
-    /// Returns the sentence for something that has not arrived.
+    /// Returns the error text for data that have not arrived.
     fn lost(&self, what: &str) -> String {
         match &flotor_core::lock(&self.received.now).end {
             Some((words, _)) => format!("the run has ended: {words}"),

@@ -21,7 +21,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Ticks between two looks for signals of Python, such as Ctrl-C.
+/// Poll interval for Python's signals, such as Ctrl-C, in ticks.
 const TICKS_BETWEEN_SIGNALS: u64 = 2_000;
 /// Longest sleep while the program waits for the end of a run.
 const LOOK: Duration = Duration::from_millis(10);
@@ -321,7 +321,7 @@ impl OpenRun {
 }
 
 impl Drop for OpenRun {
-    /// Requests the end of a run that nobody closed; its thread ends it in order.
+    /// Requests the end of a run that was not closed; its thread ends the run in order.
     fn drop(&mut self) {
         self.stop.stop();
     }

@@ -53,6 +53,15 @@ def test_a_live_loop_keeps_its_rate_while_python_is_busy():
     assert run.close() is run.summary, "a second close changes nothing"
 
 
+def test_the_times_of_a_run_are_those_of_the_clock():
+    with flotor.open(PRESS) as run:
+        offsets_ns = [run.clock_offset_ns() for _ in range(5)]
+        now_ns = time.monotonic_ns() - min(offsets_ns) - run.state.time_ns
+        print(f"offsets of the clock within {(max(offsets_ns) - min(offsets_ns)) * 1e-3:.0f} us")
+        assert -1_000_000 < now_ns < 200_000_000, "the newest tick is of now, on a machine that may be busy"
+        assert sorted(offsets_ns)[2] - min(offsets_ns) < 1_000_000, "most of them agree within a tick"
+
+
 def test_parameters_weights_and_models_change_while_the_loop_runs():
     with flotor.open(PRESS, clock="virtual") as run:
         before = run.step(500).commanded_force_n[2]
@@ -153,6 +162,8 @@ def test_a_run_ends_with_its_duration_and_goes_on_after_a_reset():
             run.step()
         run.reset()
         assert run.step(10).tick == 9
+        with pytest.raises(flotor.FlotorError, match="virtual time"):
+            run.wait()
     with flotor.open(PRESS, duration_s=0.3) as run:
         assert run.wait(0.01) is None
         assert run.wait()["end"] == "finished"
@@ -173,7 +184,7 @@ def test_a_model_that_answers_nan_fails_the_run_with_the_sentence_of_the_command
     with pytest.raises(flotor.RunFailed, match=r"libhabit\.so: `jelly` .* not finite") as failed:
         with flotor.open(model_that(tmp_path, habit), clock=clock, duration_s=0.2) as run:
             run.step(200) if clock == "virtual" else run.wait()
-    assert failed.value.exit_code == 3
+    assert failed.value.exit_code == 3 and run.summary == failed.value.summary == run.close()
     assert failed.value.summary["plugins"][1]["health"] != "ok"
     assert failed.value.summary["end"] in ("finished", "stopped")
 

@@ -1,4 +1,4 @@
-//! Interpreter in a process of its own, which answers questions over pipes.
+//! Interpreter in a separate process, which answers requests over pipes.
 
 use crate::message::{Answer, Kind, VALUES, anchored, question, read_answer};
 use flotor_hal::{ContactSet, Input, Pose};
@@ -12,7 +12,7 @@ use std::time::Duration;
 const RUNNER: &str = include_str!("runner.py");
 /// Environment variable with the path of the interpreter; `python3` without it.
 pub const INTERPRETER: &str = "FLOTOR_PYTHON";
-/// Timeout for the start, with all that the file imports: shorter than that of a host for `prepare`.
+/// Timeout of the start, imports of the file included; shorter than the host's timeout for `prepare`.
 const START: Duration = Duration::from_secs(8);
 /// Timeout of an answer. An interpreter that hangs must not keep the thread of the model.
 const PATIENCE: Duration = Duration::from_millis(500);

@@ -4,7 +4,7 @@
 //! handle to the interpreter and waits for the answer, while the loop goes on with the last one. A garbage collection, an exception or
 //! a killed interpreter never delays a tick: the force of the last answer fades.
 //!
-//! - [`interpreter`]: the process, its questions and answers. `runner.py` is the other end, embedded in the plugin.
+//! - [`interpreter`]: the process, its requests and answers. `runner.py` is the other end, embedded in the plugin.
 //! - [`message`]: bytes of a question and of an answer.
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 

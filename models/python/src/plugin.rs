@@ -1,4 +1,4 @@
-//! Plugin: parameters, and what is asked of the interpreter.
+//! Plugin: parameters, and the requests to the interpreter.
 
 use crate::interpreter::Interpreter;
 use crate::message::{VALUES, floor};
@@ -25,11 +25,11 @@ pub struct PythonModel {
     values: [f64; VALUES],
 }
 
-/// Where the contacts come from.
+/// Source of the contacts.
 enum Source {
     /// Built-in floor.
     Floor,
-    /// File that no interpreter has loaded yet, with the text for its `create`.
+    /// File not loaded yet, with the argument for its `create`.
     Unloaded(PathBuf, String),
     /// Running interpreter.
     Running(Box<Interpreter>),

@@ -11,7 +11,7 @@ use rapier3d_f64::geometry::{ColliderBuilder, ColliderHandle};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::pipeline::PhysicsWorld;
 
-/// Typical size of a body in a hand, m: the solver scales its tolerances by it.
+/// Typical size of a hand-held body, m, by which the solver scales its tolerances.
 const LENGTH_M: f64 = 0.02;
 /// Damping of a joint with friction, per second: below its friction it creeps at `friction / (mass x this)`.
 const STICKING_1_PER_S: f64 = 1.0e9;

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::ops::Range;
 use toml::Spanned;
 
-/// World as it is at its start.
+/// Initial state of a world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World {
     /// Gravitational acceleration, downwards, m/s².
@@ -227,7 +227,7 @@ pub fn parse(text: &str) -> Result<World, TextProblem> {
 fn tool(entry: &ToolEntry) -> Result<Tool, String> {
     let ToolEntry { shape, size_mm, radius_mm, length_mm, .. } = *entry;
     if matches!(shape, FormName::Plane) {
-        return Err("a tool is no plane; write shape = \"ball\", \"capsule\" or \"box\"".to_owned());
+        return Err("a tool cannot be a plane; write shape = \"ball\", \"capsule\" or \"box\"".to_owned());
     }
     Ok(Tool {
         form: form(shape, Sizes { size_mm, radius_mm, length_mm })?,
@@ -243,7 +243,7 @@ fn body(entry: &BodyEntry, line_of: &dyn Fn(Range<usize>) -> usize) -> Result<Bo
     let mut parts = Vec::with_capacity(entry.part.len().min(MOST) + 1);
     match entry.shape {
         Some(shape) => parts.push(Part { form: form(shape, sizes).map_err(here)?, place: Pose::HOME }),
-        None if sizes.is_some() => return Err(here("a body with a size has a `shape`")),
+        None if sizes.is_some() => return Err(here("the body has a size but no shape; add `shape`")),
         None => {}
     }
     for entry in entry.part.iter().take(MOST) {
@@ -256,7 +256,9 @@ fn body(entry: &BodyEntry, line_of: &dyn Fn(Range<usize>) -> usize) -> Result<Bo
         parts.push(part);
     }
     if parts.is_empty() {
-        return Err(here("a body has a `shape`, or parts: [[body.part]] with a `shape` each"));
+        return Err(here(
+            "the body has neither a shape nor parts; add `shape`, or [[body.part]] with a `shape` each",
+        ));
     }
     let has_plane = parts.iter().any(|part| part.form == Form::Plane);
     let mass_kg = match (entry.fixed, entry.mass_g) {
@@ -321,7 +323,7 @@ fn joint(entry: &JointEntry, bodies: &[Body]) -> Result<Joint, String> {
 }
 
 fn other_unit(kind: &str, right: &str, wrong: &str) -> String {
-    format!("a {kind} has `{right}` in place of `{wrong}`")
+    format!("`{wrong}` does not apply to a {kind}; write `{right}`")
 }
 
 fn stops(key: &str, stops: Option<[f64; 2]>, most: f64, unit: f64) -> Result<Option<[f64; 2]>, String> {
@@ -364,7 +366,7 @@ fn form(name: FormName, sizes: Sizes) -> Result<Form, String> {
             let radius_m = 2.0 * half_m("radius_mm", radius_mm)?;
             Ok(Form::Capsule { radius_m, half_m: half_m("length_mm", length_mm)? })
         }
-        (FormName::Plane, ..) => Err("a plane has no size".to_owned()),
+        (FormName::Plane, ..) => Err("a plane has no size; remove the sizes".to_owned()),
         (FormName::Ball, ..) => Err("a ball has a `radius_mm` and no other size".to_owned()),
         (FormName::Box, ..) => Err("a box has a `size_mm`, [x, y, z], and no other size".to_owned()),
         (FormName::Capsule, ..) => Err("a capsule has a `radius_mm`, and a `length_mm` between the centres \

@@ -52,7 +52,7 @@ impl Form {
         }
     }
 
-    /// Returns the number of places at which the form, as a tool, rests on a flat surface: they share the stiffness.
+    /// Returns the number of contact points of the form, as a tool, on a flat surface; they share the stiffness.
     #[must_use]
     pub fn feet(&self) -> f64 {
         match self {

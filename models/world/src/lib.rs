@@ -13,7 +13,7 @@
 //!
 //! - [`file`](mod@file): the file of a world, checked. [`form`]: balls, boxes, capsules and planes.
 //! - [`bodies`]: the bodies in the solver, with their joints. [`touch`]: tool and bodies, contacts, friction.
-//! - [`simulation`]: both in time. [`own`]: the worlds that the plugin brings along.
+//! - [`simulation`]: both in time. [`own`]: built-in worlds.
 //! - `drawing`, `plugin`: the contract. `vectors`: the two versions of glam.
 
 pub mod bodies;

@@ -1,11 +1,11 @@
-//! Worlds that the plugin brings along.
+//! Built-in worlds.
 
 use flotor_hal::{Choices, choices};
 
 /// Names of the worlds, for the parameter `file`.
 pub(crate) const NAMES: Choices = choices!["stack", "drawer"];
 
-/// Returns the text of a world of the plugin.
+/// Returns the text of a built-in world.
 #[must_use]
 pub fn text(name: &str) -> Option<&'static str> {
     match name {

@@ -26,26 +26,19 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         1.0e5,
         500.0,
-        "Stiffness between tool and bodies, of a tool that rests flat",
+        "Contact stiffness between a body and a tool that rests flat on it",
     )
     .live(),
-    Parameter::real(
-        "damping_ns_per_m",
-        "N s/m",
-        0.0,
-        1000.0,
-        4.0,
-        "Damping between tool and bodies, in contact",
-    )
-    .live(),
-    Parameter::file("file", own::NAMES, "World: a TOML file, or one of the plugin; the stack if not set"),
+    Parameter::real("damping_ns_per_m", "N s/m", 0.0, 1000.0, 4.0, "Contact damping between tool and bodies")
+        .live(),
+    Parameter::file("file", own::NAMES, "World: a TOML file, or a built-in world (default: stack)"),
     Parameter::real(
         "step_ms",
         "ms",
         0.05,
         10.0,
         1.0,
-        "Longest step of the bodies; shorter where a light body needs it",
+        "Maximum time step of the bodies; light bodies get a shorter one",
     ),
 ];
 
@@ -81,7 +74,7 @@ impl ForceModel for Touched {
         let is_soft = law.stiffness_n_per_m <= most.stiffness_n_per_m;
         if !is_soft || law.damping_ns_per_m > most.damping_ns_per_m {
             return Err(Refusal::parameter(format!(
-                "the lightest body bears at most {:.4} N/m and {:.4} N s/m in steps of {} ms; raise its `mass_g`, or \
+                "the lightest body permits at most {:.4} N/m and {:.4} N s/m in steps of {} ms; raise its `mass_g`, or \
                  lower `stiffness_n_per_m` or `damping_ns_per_m`",
                 most.stiffness_n_per_m,
                 most.damping_ns_per_m,
@@ -164,7 +157,7 @@ impl ShapeModel for Touched {
 }
 
 impl SoftRangeModel for Touched {
-    /// Below, a tool sinks through a thin body before it feels it; above, most devices are unstable.
+    /// With a lower stiffness a tool sinks through thin bodies; with a higher one most devices are unstable.
     const SOFT_RANGES: &'static [SoftRange] = &[
         SoftRange::new("stiffness_n_per_m", 50.0, 2000.0, 10.0),
         SoftRange::new("damping_ns_per_m", 0.0, 20.0, 0.5),

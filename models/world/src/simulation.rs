@@ -1,15 +1,15 @@
-//! World and tool in time.
+//! Simulation of a world with its tool.
 
 use crate::bodies::{Bodies, Energy};
 use crate::file::World;
 use crate::touch::{Law, Touch};
 use flotor_hal::{ContactSet, DVec3, Input, Pose, rotation_vector};
 
-/// Longest time between two calls that the bodies move, s.
+/// Maximum time by which one call moves the bodies, s.
 const LONGEST_S: f64 = 0.1;
-/// Part of the time constant of a body between tool and nothing that a step may take.
+/// Maximum step, as a fraction of the time constant of a free body in contact with the tool.
 const STEP_SHARE: f64 = 0.35;
-/// Shortest step, s.
+/// Minimum step, s.
 pub const SHORTEST_STEP_S: f64 = 5.0e-5;
 
 /// World with the tool in it.
@@ -100,7 +100,7 @@ pub fn stable_step_s(world: &World, law: &Law, most_s: f64) -> f64 {
     (STEP_SHARE * by_spring_s.min(by_damper_s)).min(most_s)
 }
 
-/// Returns the stiffest spring and the strongest damper that need no step shorter than [`SHORTEST_STEP_S`].
+/// Returns the maximum stiffness and damping for a step of [`SHORTEST_STEP_S`].
 #[must_use]
 pub fn stiffest(world: &World) -> Law {
     let (inert_kg, rate_1_per_s) = (least_inertia_kg(world), STEP_SHARE / SHORTEST_STEP_S);
@@ -110,7 +110,7 @@ pub fn stiffest(world: &World) -> Law {
     }
 }
 
-/// Returns the least mass that a tool moves, kg: at the corner of a box a quarter of it.
+/// Returns the smallest effective mass that a tool can move, kg: at the corner of a box a quarter of its mass.
 fn least_inertia_kg(world: &World) -> f64 {
     0.25 * world.bodies.iter().filter_map(|body| body.mass_kg).fold(f64::INFINITY, f64::min)
 }

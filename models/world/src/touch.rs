@@ -1,4 +1,4 @@
-//! Tool and bodies: where they are close, the force between them, and its friction.
+//! Contact between tool and bodies: proximity, force and friction.
 
 use crate::bodies::{Bodies, velocity_at};
 use crate::file::Tool;
@@ -10,9 +10,9 @@ use rapier3d_f64::parry::query::{
 };
 use rapier3d_f64::parry::shape::SharedShape;
 
-/// Distance up to which surfaces near the tool are known, m.
+/// Maximum distance of surfaces considered near the tool, m.
 pub const NEAR_M: f64 = 5.0e-3;
-/// Farthest distance of two places on the tool that are the same contact in two steps, m.
+/// Maximum distance of two points on the tool that count as one contact in successive steps, m.
 const SAME_PLACE_M: f64 = 5.0e-3;
 
 /// Law of the force between tool and bodies.
@@ -24,7 +24,7 @@ pub struct Law {
     pub damping_ns_per_m: f64,
 }
 
-/// Place at which tool and body are close.
+/// Pair of nearby points on tool and body.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     /// Index of the part of the world.
@@ -59,7 +59,7 @@ pub struct Touch {
 }
 
 impl Touch {
-    /// Takes a tool in the hand. Not real-time.
+    /// Creates a tool in the hand. Not real-time.
     #[must_use]
     pub fn new(tool: &Tool) -> Self {
         Self {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import time
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -72,6 +73,23 @@ class Run:
     def state_of(self, device: int | str) -> State:
         """Returns the newest state of a device, by its number or its name in the scene."""
         return self._run.state(device)
+
+    def clock_offset_ns(self, ticks: int = 50) -> int:
+        """Returns ``time.monotonic_ns()`` at time 0 of the run, to compare the times of its states with those of cameras and robots.
+
+        Observes the arrival of some ticks; the smallest difference counts, which is late by the time that a tick takes to compute and
+        Python to look: tens of microseconds. For a run on the real clock, while it runs.
+        """
+        if self._clock == "virtual":
+            raise FlotorError("a run in virtual time has no time of a clock")
+        least, tick = None, self.state.tick
+        for _ in range(ticks):
+            while (state := self.state).tick == tick and self.running:
+                pass
+            now_ns = time.monotonic_ns()
+            tick, difference = state.tick, now_ns - state.time_ns - state.lateness_ns
+            least = difference if least is None else min(least, difference)
+        return least
 
     @property
     def running(self) -> bool:
@@ -152,6 +170,8 @@ class Run:
 
         Raises :class:`RunFailed` if it did not end in order. Ctrl-C ends the waiting, and with it the ``with`` block.
         """
+        if self._clock == "virtual":
+            raise FlotorError("a run in virtual time ends by `step` and `close`; open it with clock=\"real\" to wait for its end")
         if self.summary is None:
             ended = self._run.wait(1e9 if timeout_s is None else timeout_s)
             if ended is None:
@@ -171,7 +191,11 @@ class Run:
 
     def _told(self, ended: tuple[str | None, tuple[str, int] | None]) -> None:
         _open_runs.discard(self)
-        self.summary = told(*ended)
+        try:
+            self.summary = told(*ended)
+        except RunFailed as failed:
+            self.summary = failed.summary
+            raise
 
     def _finish(self) -> None:
         """Raises RunFailed for a run in virtual time that a fault has ended; one whose duration is over can be reset."""
