@@ -33,11 +33,7 @@ impl NewestAnswer {
     ///
     /// # Errors
     /// If a limit is not above 0.
-    pub fn new(
-        mapping: &Mapping,
-        limits: &ContactLimits,
-        periods_ns: [u64; 2],
-    ) -> Result<Self, NotPositive> {
+    pub fn new(mapping: &Mapping, limits: &ContactLimits, periods_ns: [u64; 2]) -> Result<Self, NotPositive> {
         let [loop_s, model_s] = periods_ns.map(|period_ns| period_ns as f64 * 1.0e-9);
         let cap = limits.cap.unwrap_or(StiffnessCap::UNKNOWN);
         // Stiffness and damping have the same scale.

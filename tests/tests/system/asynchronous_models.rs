@@ -188,7 +188,13 @@ fn the_value_of_a_parameter_is_the_present_one_wherever_the_model_runs() {
     let asynchronous = |clock| {
         let timing = FieldTiming { rate_hz: 200.0, latency_s: 0.005, contacts: ContactLimits::UNKNOWN };
         let mapping = Mapping::new(&MappingConfig::default());
-        let model = AsynchronousModel::start(here(), count, (&timing, &[(&mapping, &timing.contacts)]), &config, clock);
+        let model = AsynchronousModel::start(
+            here(),
+            count,
+            (&timing, &[(&mapping, &timing.contacts)]),
+            &config,
+            clock,
+        );
         Engine::Asynchronous(Box::new(model.expect("it starts")))
     };
     let worker = Worker::start(&WorkerConfig {

@@ -104,7 +104,13 @@ impl Scene<'_> {
         if let Some(rate_hz) = self.rate_hz {
             let timing = FieldTiming { rate_hz, latency_s: 1.0 / rate_hz, contacts: self.contacts };
             let (count, clock) = (plugin.parameters().len(), Clock::Virtual);
-            let model = AsynchronousModel::start(engine, count, (&timing, &[(&mapping, &timing.contacts)]), &CONFIG, clock);
+            let model = AsynchronousModel::start(
+                engine,
+                count,
+                (&timing, &[(&mapping, &timing.contacts)]),
+                &CONFIG,
+                clock,
+            );
             engine = Engine::Asynchronous(Box::new(model.expect("the limits are above 0")));
         } else {
             engine.prepare(&CONFIG).expect("a wall needs nothing");

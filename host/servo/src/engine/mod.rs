@@ -69,7 +69,12 @@ impl Engine {
     /// Steps the model once for all its ports. Outputs are only valid if the result is [`Stepped::Answered`]; an asynchronous model
     /// writes to `stepped` the result at each port, as of [`Self::step`]. Returns [`Stepped::Broken`] for a model without ports, and
     /// for a worker. Real-time: bounded by the model, no allocation.
-    pub fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output], stepped: &mut [Stepped]) -> Stepped {
+    pub fn step_ports(
+        &mut self,
+        inputs: &[Input],
+        outputs: &mut [Output],
+        stepped: &mut [Stepped],
+    ) -> Stepped {
         match self {
             Self::Here(model) => model.step_ports(inputs, outputs).into(),
             Self::Process(_) => Stepped::Broken,
