@@ -239,6 +239,13 @@ wheel() {
     PATH=$PWD/target/venv/bin:$PATH FLOTOR_PYTHON=$PWD/target/venv/bin/python book_blocks wheel
 }
 
+# Flotor's devices as teleoperators of LeRobot as it comes from the package index, in an environment of its own: ten minutes through a wall.
+lerobot() {
+    python3.12 -m venv target/lerobot
+    CARGO_TARGET_DIR=$PWD/target target/lerobot/bin/pip install --quiet interop/python interop/lerobot pytest
+    FLOTOR_TELEOPERATION_S=600 target/lerobot/bin/python -m pytest -q interop/lerobot
+}
+
 # book_blocks STEP [COMMAND...]: runs the blocks of the book that are marked with this step, in the chapters that have them; with a
 # command that starts another one, through it.
 book_blocks() {

@@ -462,7 +462,7 @@ typedef struct FlotorParameter {
 
 // Outputs that a scene needs from a step; other outputs need not be computed.
 //
-// The shape is no output of a step: observers query the shape outside the loop, through the extensions
+// The shape is not an output of a step: observers query the shape outside the loop, through the extensions
 // [`crate::extension::centerline`] and [`crate::extension::shape`].
 typedef struct FlotorDemand {
     uint32_t bits;
@@ -1175,7 +1175,7 @@ typedef struct FlotorSnapshotTable {
     uint32_t (*count)(FlotorInstance instance, uint64_t *out);
     // Writes the state to `count` bytes; `OutOfRange` for another number of bytes.
     uint32_t (*save)(FlotorInstance instance, uint8_t *bytes, uint64_t count);
-    // Restores a state from `count` bytes; `OutOfRange` for another number of bytes, and for bytes that are no state:
+    // Restores a state from `count` bytes; `OutOfRange` for another number of bytes, and for bytes that are not a state:
     // the caller then resets or destroys the instance.
     uint32_t (*restore)(FlotorInstance instance, const uint8_t *bytes, uint64_t count);
 } FlotorSnapshotTable;

@@ -14,7 +14,7 @@ layout! {
 
 /// Outputs that a scene needs from a step; other outputs need not be computed.
 ///
-/// The shape is no output of a step: observers query the shape outside the loop, through the extensions
+/// The shape is not an output of a step: observers query the shape outside the loop, through the extensions
 /// [`crate::extension::centerline`] and [`crate::extension::shape`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -75,7 +75,7 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 /// Reads a text file of at most 256 MiB, as [`text_from_bytes`] does; `what` describes the file in an error. Not real-time.
 ///
 /// # Errors
-/// If the file cannot be read, is larger than 256 MiB or is no valid text (errors of [`text_from_bytes`]).
+/// If the file cannot be read, is larger than 256 MiB or is not a valid text (errors of [`text_from_bytes`]).
 pub fn read_text(path: &Path, what: &str) -> Result<String, TextProblem> {
     let bytes = read_file(path, MOST_TEXT_BYTES)
         .map_err(|error| TextProblem::of_file(format!("cannot read {what}: {error}")))?;

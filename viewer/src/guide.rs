@@ -117,7 +117,7 @@ fn has_hand(plugin: &PanelPlugin) -> bool {
     plugin.is_simulated && has(GUIDE) && TARGET_MM.iter().all(|id| has(id))
 }
 
-/// Returns whether a parameter of a plugin guides its hand and is left out of panels.
+/// Returns true if a parameter of a plugin guides its hand; panels omit such parameters.
 #[must_use]
 pub fn is_for_guides(plugin: &PanelPlugin, parameter: &str) -> bool {
     plugin.is_simulated && is_guidance(parameter)

@@ -245,7 +245,7 @@ impl eframe::App for Kept {
     }
 }
 
-/// Returns the first line of a library's message, without the full stop and without the place in the source, which is no help to users
+/// Returns the first line of a library's message, without the full stop and without the place in the source, which is useless to users
 /// without a display.
 fn one_line(text: &str) -> String {
     let line =

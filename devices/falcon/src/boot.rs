@@ -55,7 +55,7 @@ pub enum BootFailure {
             Falcon without a hub, or start the emulator, and try again"
     )]
     Lost,
-    /// A packet without its two status bytes: the chip is no FTDI, or the link is broken.
+    /// A packet without its two status bytes: the chip is not an FTDI, or the link is broken.
     #[error(
         "the USB chip sends packets without the two bytes of its status; connect the Falcon without a hub, and try again"
     )]

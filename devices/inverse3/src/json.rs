@@ -122,7 +122,7 @@ impl<'a> Cursor<'a> {
     /// Reads a string; its escapes stay undecoded.
     ///
     /// # Errors
-    /// If the value is no string.
+    /// If the value is not a string.
     pub fn text(&mut self) -> Result<&'a str, Malformed> {
         self.expect(b'"')?;
         let start = self.at;
@@ -142,7 +142,7 @@ impl<'a> Cursor<'a> {
     /// Reads a number.
     ///
     /// # Errors
-    /// If the value is no number.
+    /// If the value is not a number.
     pub fn number(&mut self) -> Result<f64, Malformed> {
         let Scalar::Number(number) = self.scalar()? else { return Err(Malformed) };
         Ok(number)

@@ -101,7 +101,7 @@ pub struct Setting {
     pub path: &'static [&'static str],
     /// Required value; also the default of an absent optional setting.
     pub value: Scalar<'static>,
-    /// Whether the setting may be absent.
+    /// Presence of a setting: required or optional.
     pub presence: Presence,
 }
 

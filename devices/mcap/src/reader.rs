@@ -1,4 +1,4 @@
-//! Sequential reader that never needs the index at the end, so that a truncated file is no special case.
+//! Sequential reader that never needs the index at the end, so that a truncated file is not a special case.
 //! No file can make the reader panic or allocate without bound: lengths are checked against the available bytes and the
 //! limit of a record.
 

@@ -32,7 +32,7 @@ pub enum NotOpened {
     /// Another program uses the port.
     #[error("another program uses the port; close that program first")]
     InUse,
-    /// The path is no serial port.
+    /// The path is not a serial port.
     #[error("the file is not a usable serial port; {}", platform::PORT_LIST)]
     NoPort,
     /// There is no file at the path, or another error of the system.

@@ -147,28 +147,49 @@ impl Plant {
     ///
     /// Real-time: bounded, no allocation. A piece length other than the nominal and the previous one costs a new set of
     /// response functions.
-    #[inline]
+    #[inline(always)] // in the middle of a tick
     pub fn advance(&mut self, piece_ns: u64, coils: &Wrench, hand: Option<&Intention>) -> Outcome {
-        if piece_ns == 0 {
-            return Outcome::Moved(Work::default());
-        }
-        let piece_ns = piece_ns.min(MAX_PIECE_NS);
-        let intention = hand.unwrap_or(&NO_INTENTION);
-        let scheme = match hand {
-            Some(hand) => {
-                let fits = |held: &&mut Held| held.yielding == hand.yielding;
-                self.held.iter_mut().find(fits).map_or(&mut self.free, |held| &mut held.scheme)
-            }
-            None => &mut self.free,
+        let Some(hand) = hand else { return self.advance_free(piece_ns, coils) };
+        let scheme = match self.held.as_mut_slice() {
+            [held, ..] if held.yielding == hand.yielding => &mut held.scheme,
+            others => yielding_scheme(others, hand.yielding).unwrap_or(&mut self.free),
         };
-        match scheme.step(&self.motion, piece_ns, coils, intention) {
-            Some((motion, work)) => {
-                let motion = motion.moving_settled();
-                let is_sound = motion.moves_physically() && work.is_finite();
-                go_on(&mut self.motion, is_sound.then_some((motion, work)))
-            }
-            None => advance_by_steps(&mut self.motion, scheme, piece_ns, coils, intention),
+        advance_piece(&mut self.motion, scheme, piece_ns, coils, hand)
+    }
+
+    /// Advances a flotor without a hand. Real-time: bounded, no allocation.
+    #[inline(never)] // inlined, the numbers of a hand would be kept in memory for both cases
+    fn advance_free(&mut self, piece_ns: u64, coils: &Wrench) -> Outcome {
+        advance_piece(&mut self.motion, &mut self.free, piece_ns, coils, &NO_INTENTION)
+    }
+}
+
+/// Returns the scheme of the hand that yields along these axes. Real-time: bounded, no allocation.
+#[inline(never)] // most hands never yield
+fn yielding_scheme(held: &mut [Held], yielding: BVec3) -> Option<&mut Scheme> {
+    held.iter_mut().find(|held| held.yielding == yielding).map(|held| &mut held.scheme)
+}
+
+/// Advances a piece, clamped to [`MAX_PIECE_NS`]. Real-time: bounded, no allocation.
+#[inline(always)] // in the middle of a tick
+fn advance_piece(
+    motion: &mut Motion,
+    scheme: &mut Scheme,
+    piece_ns: u64,
+    coils: &Wrench,
+    intention: &Intention,
+) -> Outcome {
+    if piece_ns == 0 {
+        return Outcome::Moved(Work::default());
+    }
+    let piece_ns = piece_ns.min(MAX_PIECE_NS);
+    match scheme.step(motion, piece_ns, coils, intention) {
+        Some((next, work)) => {
+            let next = next.moving_settled();
+            let is_sound = next.moves_physically() && work.is_finite();
+            go_on(motion, is_sound.then_some((next, work)))
         }
+        None => advance_by_steps(motion, scheme, piece_ns, coils, intention),
     }
 }
 

@@ -23,7 +23,7 @@ pub enum LibraryProblem {
         /// Error of the system.
         reason: String,
     },
-    /// The file is no shared library.
+    /// The file is not a shared library.
     #[error(
         "{path} is not a shared library; name the file that ends in {LIBRARY_ENDING} with the parameter `library`"
     )]

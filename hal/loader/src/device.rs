@@ -207,6 +207,15 @@ impl ActiveDevice {
         self.calls.set_parameter(handle.table.set_parameter, handle.parameters, index, value)
     }
 
+    /// Returns the current values of all parameters, by their index in the schema. Not real-time.
+    #[must_use]
+    pub fn parameters(&mut self) -> Vec<f64> {
+        let Self { handle, calls, .. } = self;
+        let Some(handle) = handle else { return Vec::new() };
+        let value = |index| calls.parameter(handle.table.parameter, handle.parameters, index);
+        (0..handle.parameters.len()).map(value).collect()
+    }
+
     pub(crate) fn extensions(&self) -> Option<&DeviceExtensions> {
         Some(&self.handle.as_ref()?.extensions)
     }

@@ -18,7 +18,7 @@ pub enum LoadError {
         /// Error of the operating system.
         cause: std::io::Error,
     },
-    /// The file is no shared library, or a damaged one.
+    /// The file is not a shared library, or a damaged one.
     #[error("{}: not a shared library ({cause}); name the library of a plugin, or build this library again", path.display())]
     NotALibrary {
         /// Path of the plugin.

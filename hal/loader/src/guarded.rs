@@ -33,7 +33,7 @@ impl GuardedInstance {
         Self { instance, float_changes: 0 }
     }
 
-    /// Creates an instance from settings; `nothing` is the reason of the refusal if the plugin writes no instance.
+    /// Creates an instance from settings; `nothing` is the message of the refusal if the plugin returns no instance.
     pub(super) fn create(
         create: CreateFn,
         parameters: &'static [Parameter],

@@ -70,7 +70,7 @@ enum Direction<'a> {
 }
 
 impl StateBytes<'_> {
-    /// Passes a state; returns its number of bytes, or `OutOfRange` if the bytes are no state.
+    /// Passes a state; returns its number of bytes, or `OutOfRange` if the bytes are not a state.
     fn run(state: &mut dyn Restorable, direction: Direction<'_>) -> Result<u64, CallStatus> {
         let mut bytes = StateBytes { direction, count: 0, is_valid: true };
         state.pass(&mut bytes);
@@ -185,7 +185,7 @@ pub struct SnapshotTable {
     pub count: Option<unsafe extern "C" fn(instance: Instance, out: *mut u64) -> u32>,
     /// Writes the state to `count` bytes; `OutOfRange` for another number of bytes.
     pub save: Option<unsafe extern "C" fn(instance: Instance, bytes: *mut u8, count: u64) -> u32>,
-    /// Restores a state from `count` bytes; `OutOfRange` for another number of bytes, and for bytes that are no state:
+    /// Restores a state from `count` bytes; `OutOfRange` for another number of bytes, and for bytes that are not a state:
     /// the caller then resets or destroys the instance.
     pub restore: Option<unsafe extern "C" fn(instance: Instance, bytes: *const u8, count: u64) -> u32>,
 }

@@ -1,8 +1,8 @@
 //! Extension `flotor.world-contacts/1`: contacts at every port of one object, from a model that is too slow for the loop.
 //!
-//! What `flotor.world/1` is for a model in the loop, for one that runs asynchronously: an instance has one state, and each
-//! call returns the [`ContactSet`] of every port. The loop solves the contacts of each port at that hand at every tick, with an
-//! age and an account of its own, so that several hands feel one object that needs milliseconds for an answer.
+//! Counterpart of `flotor.world/1` for a model that runs asynchronously: an instance has one state, and each call returns the
+//! [`ContactSet`] of every port. The loop solves the contacts of each port at every tick, with a separate age and energy balance,
+//! so that several hands can touch an object that needs milliseconds for a step.
 
 use crate::abi::instance::call;
 use crate::abi::interface::table;

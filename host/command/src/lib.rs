@@ -4,6 +4,7 @@
 //! - [`options`]: options that several commands have, and parsers of option values.
 //! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: output of results, human-readable or as JSON.
 //! - [`tables`]: results as tables.
+//! - [`verdict()`]: the result of a run as that of a command.
 //! - [`supervised`]: execution of a command in a child process, whose end counts as an error unless the host has reported success.
 //! - [`PluginProcess`]: a process that runs plugin code and ends with the command.
 //! - [`stopping`]: signals and keys that end a run.
@@ -24,6 +25,7 @@ pub mod stopping;
 pub mod style;
 mod supervision;
 pub mod tables;
+mod verdict;
 
 pub use flotor_session::PluginProcess;
 
@@ -37,3 +39,4 @@ pub use progress::{Redrawn, progress_bar, while_preparing};
 pub use reference::{reference, whole_program};
 pub use shell::{command_line, quoted};
 pub use supervision::supervised;
+pub use verdict::{end_notes, end_words, verdict};

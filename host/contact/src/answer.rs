@@ -89,13 +89,13 @@ impl NewestAnswer {
         })
     }
 
-    /// Returns what the hand has felt of the stiffness of contacts so far. Real-time: bounded, no allocation.
+    /// Returns the reductions of contact stiffness so far. Real-time: bounded, no allocation.
     #[must_use]
     pub fn felt_stiffness(&self) -> FeltStiffness {
         self.contacts.felt_stiffness()
     }
 
-    /// Forgets all answers: without force until the next. Real-time: bounded, no allocation.
+    /// Removes all answers: no force until the next one. Real-time: bounded, no allocation.
     pub fn clear(&mut self) {
         self.contacts.clear();
         self.fields.clear();

@@ -1,4 +1,4 @@
-//! Offset of the tool from the handle that keeps a set of contacts from being stiffer than the coupling.
+//! Compliance between handle and tool that limits the stiffness of a contact set to that of the coupling.
 
 use crate::Coupling;
 use crate::linear::{self, ROWS, Symmetric6, Vector6};
@@ -23,7 +23,7 @@ impl OffsetSpace {
     /// The handle and the tool coincide.
     pub(crate) const RIGID: Self = Self { columns: linear::ZERO, excess: 1.0 };
 
-    /// Returns the offsets that springs need behind the coupling. Real-time: bounded, no allocation.
+    /// Returns the offset space of a set of springs behind the coupling. Real-time: bounded, no allocation.
     ///
     /// With their stiffness `N` in units of the coupling's, `N = V diag(s) V^T`, the compliance `V diag(max(0, 1 - 1/s)) V^T`
     /// in series makes it `V diag(min(s, 1)) V^T`.
@@ -56,7 +56,7 @@ impl OffsetSpace {
         space
     }
 
-    /// Returns true if no offset is needed: the set is nowhere stiffer than the coupling.
+    /// Returns true if no offset is needed: the set is not stiffer than the coupling in any direction.
     pub(crate) fn is_rigid(&self) -> bool {
         self.excess <= 1.0
     }
@@ -66,7 +66,7 @@ impl OffsetSpace {
         self.excess
     }
 
-    /// Returns the work of force and torque by each coordinate: the coordinates of the offset that they cause.
+    /// Returns the generalised force on each coordinate, which equals the coordinate of the resulting offset.
     pub(crate) fn coordinates(&self, force: DVec3, torque: DVec3) -> Vector6 {
         let generalized = generalized(force, torque);
         self.columns.each_ref().map(|column| linear::dot(column, &generalized))

@@ -35,7 +35,7 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// Returns a contact as a model publishes it, with nothing checked.
+    /// Converts a published contact, without checks.
     fn unchecked(contact: &flotor_hal::Contact) -> Self {
         Self {
             tool_point_m: DVec3::from_array(contact.tool_point_m),
@@ -55,7 +55,7 @@ impl Contact {
         if self.friction > 0.0 { self.tangential_stiffness_n_per_m } else { 0.0 }
     }
 
-    /// Returns the contact with a normal of length 1 to rounding, or the first field that is wrong.
+    /// Returns the contact with its normal scaled to length 1, or the first invalid field.
     fn checked(&self, anchor: &Pose) -> Result<Self, (&'static str, Fault)> {
         let vectors = [
             ("tool_point_m", self.tool_point_m),
@@ -102,7 +102,7 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// Any motion, any time.
+    /// Unlimited motion and time.
     pub const UNLIMITED: Self =
         Self { displacement_m: f64::INFINITY, rotation_rad: f64::INFINITY, duration_s: f64::INFINITY };
 }
@@ -120,7 +120,7 @@ impl ContactSet {
     /// Checks a set that was computed for the tool at the pose `anchor`. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If there are more than [`MAX_CONTACTS`], or a number is not finite, out of its range or contradicts another.
+    /// If there are more than [`MAX_CONTACTS`], or a number is not finite, out of its range or inconsistent with another one.
     pub fn new(anchor: &Pose, contacts: &[Contact], validity: Validity) -> Result<Self, ContactSetError> {
         if contacts.len() > MAX_CONTACTS {
             return Err(ContactSetError::TooMany { count: contacts.len() });
@@ -141,8 +141,7 @@ impl ContactSet {
         Ok(set)
     }
 
-    /// Checks a set as a model publishes it; one without a validity in time of its own is valid for `valid_s`. Real-time: bounded,
-    /// no allocation.
+    /// Checks a published set; a set that declares no validity time is valid for `valid_s`. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -159,7 +158,7 @@ impl ContactSet {
         Self::new(&set.anchor, contacts, validity)
     }
 
-    /// Returns the set with each contact exchanged.
+    /// Returns the set with each contact transformed by `exchange`.
     pub(crate) fn map(mut self, mut exchange: impl FnMut(Contact) -> Contact) -> Self {
         self.contacts.iter_mut().take(self.count).for_each(|contact| *contact = exchange(*contact));
         self
@@ -211,7 +210,7 @@ pub enum ContactSetError {
     Anchor,
     /// A limit of the range of validity is not above 0.
     Validity,
-    /// A contact with a wrong number.
+    /// A contact with an invalid number.
     Contact {
         /// Index of the contact.
         index: usize,
@@ -239,7 +238,10 @@ impl fmt::Display for ContactSetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooMany { count } => {
-                write!(f, "{count} contacts: a set has at most {MAX_CONTACTS}; send the deepest ones")
+                write!(
+                    f,
+                    "the set has {count} contacts, above the limit of {MAX_CONTACTS}; send the deepest ones"
+                )
             }
             Self::Anchor => {
                 write!(f, "the anchor is not a pose: send finite numbers and a unit quaternion")
@@ -259,8 +261,8 @@ impl fmt::Display for Fault {
             Self::NotUnit => "does not have length 1: normalize it",
             Self::TooSmall => "is too small: a stiffness is above 0, damping and friction are not below 0",
             Self::Inconsistent => {
-                "is not the distance from the point of the surface to that of the tool along the normal: \
-                 give all three for the pose of the anchor"
+                "is not the distance between the points of surface and tool along the normal: \
+                 compute all three at the pose of the anchor"
             }
         })
     }
@@ -273,7 +275,7 @@ pub(crate) fn is_usable_pose(pose: &Pose) -> bool {
     are_usable(&pose.position_m) && are_usable(&pose.orientation_xyzw) && is_unit(pose.orientation().length())
 }
 
-/// Returns true if no number is NaN or too large.
+/// Returns true if all numbers are finite and at most [`LARGEST`] in magnitude.
 pub(crate) fn are_usable(numbers: &[f64]) -> bool {
     numbers.iter().all(|number| number.abs() <= LARGEST)
 }

@@ -1,4 +1,4 @@
-//! Largest stiffness that a hand feels, and the largest wrench.
+//! Limits of the rendered stiffness and wrench.
 
 use flotor_hal::Wrench;
 use std::fmt;
@@ -11,10 +11,10 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    /// A coupling that does not yield: no stiffness is reduced.
+    /// Rigid coupling: no stiffness is reduced.
     pub const RIGID: Self = Self { stiffness_n_per_m: f64::INFINITY, stiffness_nm_per_rad: f64::INFINITY };
 
-    /// Creates a coupling; an infinite stiffness does not yield (rotation of a device without torques). Not real-time.
+    /// Creates a coupling; an infinite stiffness is rigid (rotation of a device without torques). Not real-time.
     ///
     /// # Errors
     /// If a stiffness is not above 0.
@@ -52,13 +52,13 @@ impl Limits {
         Ok(Self { force_n, torque_nm })
     }
 
-    /// Returns the wrench with force and torque shortened to the limits, and true if one of them was; a torque that the device
-    /// does not have does not count. Real-time: bounded, no allocation.
+    /// Returns the wrench with force and torque scaled down to the limits, and true if one of them exceeded its limit; torque on
+    /// a device without torques does not count. Real-time: bounded, no allocation.
     pub(crate) fn limit(&self, wrench: &Wrench) -> (Wrench, bool) {
         let [(force, is_weaker), (torque, is_looser)] =
             [(wrench.force(), self.force_n), (wrench.torque(), self.torque_nm)].map(|(vector, longest)| {
                 let length = vector.length();
-                // The division may round up: some units in the last place less are never above the limit.
+                // The division may round up: subtract some units in the last place, so that the result never exceeds the limit.
                 let share = (longest / length) * (1.0 - 4.0 * f64::EPSILON);
                 if length <= longest { (vector, false) } else { (vector * share, longest > 0.0) }
             });
@@ -81,7 +81,7 @@ impl fmt::Display for NotPositive {
 
 impl std::error::Error for NotPositive {}
 
-/// Accepts numbers above 0, and no NaN.
+/// Accepts numbers above 0; rejects NaN.
 pub(crate) fn check(field: &'static str, number: f64) -> Result<(), NotPositive> {
     if number > 0.0 { Ok(()) } else { Err(NotPositive { field }) }
 }

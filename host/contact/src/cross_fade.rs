@@ -2,7 +2,7 @@
 
 use flotor_hal::{LinearField, Pose, Wrench};
 
-/// Bilateral part of published sets: newest field, the field before the newest, and the fade between both.
+/// Bilateral part of published sets: the two newest fields and the fade between them.
 #[derive(Clone, Copy, Debug)]
 pub struct CrossFade {
     old: LinearField,
@@ -35,7 +35,7 @@ impl CrossFade {
                 *old += share * (new - *old);
             }
         }
-        // The old field counts until the new one has faded in.
+        // The old field is in use until the new one has faded in.
         let before = if share < 1.0 { &self.old } else { &self.new };
         self.old = LinearField {
             anchor: *pose,

@@ -3,8 +3,8 @@
 /// Force along the normal as a function of depth: 0 up to `start_m`, then steeper up to `knee_m` than beyond it.
 ///
 /// Spring and damper: with approach speed `v` and stiffness `k`, the force is `k d + b v` and never below 0. A contact that is
-/// younger than a period cannot have approached for all of it, so the damper's part is at most `b d / period`: the force starts
-/// at 0 and is a continuous function of depth that never falls, the slope of a convex energy.
+/// younger than a period cannot have approached for all of it, so the damping force is at most `b d / period`: the force starts
+/// at 0 and is a continuous, non-decreasing function of depth, the derivative of a convex energy.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct NormalLaw {
     start_m: f64,
@@ -51,7 +51,7 @@ pub(crate) struct FrictionLaw {
 
 /// Friction at a stretch.
 pub(crate) struct Friction {
-    /// Part of the stretch that the limit leaves to the spring, 0 to 1.
+    /// Fraction of the stretch that the spring holds within the friction limit, 0 to 1.
     pub(crate) held: f64,
     /// Direction of the stretch while the contact slides.
     pub(crate) sliding: Option<[f64; 2]>,

@@ -68,7 +68,7 @@
 //!
 //! # The error of the friction
 //!
-//! Coulomb's law limits friction by the normal force of the same instant. Together with an offset this is no convex problem and
+//! Coulomb's law limits friction by the normal force of the same instant. Together with an offset this is not a convex problem and
 //! may have several answers or none. Without an offset (`G = 0`) the normal force does not depend on friction, and the limit is
 //! that of the same tick: the law is exact. With an offset the limit is the normal force of the last solve times `mu`: the error
 //! is `mu` times the change of the normal force in one tick (at 10 kN/m, 0.1 m/s, 1 kHz and `mu = 0.5`: 0.5 N at the most), and

@@ -1,5 +1,5 @@
 //! Vectors and symmetric matrices of six rows.
-// Every index runs over the six rows of an array of six; matrices read as in the textbook.
+// Every index is from 0 to 5 into an array of six; loops over indices read as in textbooks.
 #![allow(clippy::indexing_slicing, clippy::needless_range_loop)]
 
 /// Number of coordinates of a rigid motion.
@@ -9,7 +9,7 @@ pub(crate) type Vector6 = [f64; ROWS];
 /// Symmetric matrix: only the triangle below the diagonal, and the diagonal, are used.
 pub(crate) type Symmetric6 = [Vector6; ROWS];
 
-/// Matrix without entries.
+/// Zero matrix.
 pub(crate) const ZERO: Symmetric6 = [[0.0; ROWS]; ROWS];
 /// Unit matrix.
 pub(crate) const IDENTITY: Symmetric6 = {
@@ -25,7 +25,7 @@ pub(crate) const IDENTITY: Symmetric6 = {
 /// Returns the scalar product.
 #[inline]
 pub(crate) fn dot(a: &Vector6, b: &Vector6) -> f64 {
-    // Two chains of three, one after the other in the lanes of a register.
+    // Two independent sums of three products, for two lanes of a register.
     let even = a[0] * b[0] + a[2] * b[2] + a[4] * b[4];
     let odd = a[1] * b[1] + a[3] * b[3] + a[5] * b[5];
     even + odd
@@ -39,7 +39,7 @@ pub(crate) fn add(to: &mut Vector6, vector: &Vector6, factor: f64) {
     }
 }
 
-/// Adds `factor` times the product of a column with its row.
+/// Adds `factor` times the outer product of a vector with itself.
 #[inline]
 pub(crate) fn add_square(to: &mut Symmetric6, vector: &Vector6, factor: f64) {
     for row in 0..ROWS {
@@ -61,7 +61,7 @@ pub(crate) fn solve(mut matrix: Symmetric6, right: &Vector6) -> Vector6 {
             for before in 0..column {
                 sum -= matrix[row][before] * matrix[column][before];
             }
-            // Not yet divided by the pivot, so that the products above need none.
+            // Store the entry without division by the pivot: the products above use it undivided.
             matrix[row][column] = sum;
         }
         let mut pivot = matrix[row][row];
@@ -72,7 +72,7 @@ pub(crate) fn solve(mut matrix: Symmetric6, right: &Vector6) -> Vector6 {
             matrix[row][before] = divided;
             x[row] -= divided * x[before];
         }
-        // Exact pivots are at least 1; a rounded one may not be.
+        // Exact pivots are at least 1; a rounded pivot may be smaller.
         inverse[row] = 1.0 / if pivot > 0.5 { pivot } else { 0.5 };
     }
     for row in (0..ROWS).rev() {
@@ -84,7 +84,7 @@ pub(crate) fn solve(mut matrix: Symmetric6, right: &Vector6) -> Vector6 {
     x
 }
 
-/// Largest number of sweeps over all pairs of rows. Convergence is quadratic: six reach rounding.
+/// Largest number of sweeps over all pairs of rows. Convergence is quadratic: six reach rounding error.
 const SWEEPS: usize = 12;
 
 /// Returns the eigenvalues, and the eigenvectors in the same order (Jacobi's method, G. Golub, C. Van Loan, "Matrix

@@ -1,4 +1,4 @@
-//! Minimum of the energy of the offset: a semismooth Newton method with a line search to the root of the slope.
+//! Minimum of the energy of the offset: a semismooth Newton method with an exact line search.
 //!
 //! The energy `E(w) = w^T w / 2 + sum over contacts` is convex with a second derivative of at least 1, and once continuously
 //! differentiable, so it has exactly one minimum. Each step solves with the second derivative of the piece that the iterate is
@@ -8,14 +8,14 @@
 use crate::law::{FrictionLaw, NormalLaw};
 use crate::linear::{self, Vector6};
 
-/// Derivatives of gap and stretch of a contact by the coordinates of the offset.
+/// Derivatives of gap and stretch of a contact with respect to the coordinates of the offset.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Rows {
     pub(crate) normal: Vector6,
     pub(crate) tangents: [Vector6; 2],
 }
 
-/// A contact in a tick, at the pose of the handle.
+/// Terms of a contact in the energy of one tick, at the pose of the handle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Term {
     pub(crate) rows: Rows,
@@ -44,9 +44,9 @@ impl Term {
 
 /// Largest number of Newton steps. A tick takes one to four, a tool that jumps up to 14 (the test `random_sets` prints them).
 pub(crate) const MAX_STEPS: u32 = 40;
-/// Largest number of slopes that a line search evaluates.
+/// Maximum number of slopes evaluated in a line search.
 const MAX_SLOPES: u32 = 40;
-/// Share of the first slope below which a line search ends.
+/// Fraction of the initial slope below which a line search ends.
 const SLOPE_TOLERANCE: f64 = 1.0e-3;
 /// Multiple of the rounding error of a gradient at which the minimum is reached: each sum has at most 16 * 3 + 1 terms.
 const ROUNDINGS: f64 = 8.0;
@@ -59,7 +59,7 @@ pub(crate) struct Minimum {
     pub(crate) steps: u32,
 }
 
-/// Returns the offset of least energy, or after `most_steps` the one with the smallest gradient so far. Real-time: bounded, no
+/// Returns the offset of minimum energy, or after `most_steps` the iterate with the smallest gradient. Real-time: bounded, no
 /// allocation.
 pub(crate) fn minimize(terms: &[Term], start: &Vector6, most_steps: u32) -> Minimum {
     let mut offset = *start;
@@ -117,7 +117,7 @@ fn norm(vector: &Vector6) -> f64 {
     linear::dot(vector, vector).sqrt()
 }
 
-/// Returns the second derivative of the piece of the energy at an offset.
+/// Returns the second derivative of the energy at an offset.
 #[inline]
 fn second_derivative(terms: &[Term], offset: &Vector6) -> linear::Symmetric6 {
     let mut matrix = linear::IDENTITY;
@@ -139,7 +139,7 @@ fn second_derivative(terms: &[Term], offset: &Vector6) -> linear::Symmetric6 {
                 linear::add_square(&mut matrix, first, factor);
                 linear::add_square(&mut matrix, second, factor);
             }
-            // The force changes only across the direction of sliding.
+            // Sliding friction has a constant magnitude: its derivative is perpendicular to the sliding direction.
             Some([along_first, along_second]) => {
                 let mut across = [0.0; 6];
                 linear::add(&mut across, first, -along_second);
@@ -153,7 +153,7 @@ fn second_derivative(terms: &[Term], offset: &Vector6) -> linear::Symmetric6 {
 
 /// Returns the length of the step along a direction of descent at which the slope of the energy is 0.
 ///
-/// The slope never falls along the line. Newton's method on it, inside an interval that is known to have the root.
+/// The slope never falls along the line. Newton's method on the slope, inside an interval that contains the root.
 #[inline]
 fn step_length(terms: &[Term], offset: &Vector6, direction: &Vector6, enough: f64) -> f64 {
     let (mut below, mut above) = (0.0, f64::INFINITY);

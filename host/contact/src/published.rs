@@ -4,11 +4,11 @@ use crate::contact::{Contact, ContactSet, ContactSetError};
 use crate::solver::{Outcome, Solver};
 use flotor_hal::{Input, Wrench};
 
-/// Stiffness of contacts that damping keeps stable: that of the device's damping, and more for each contact with a damper of its own.
+/// Stable stiffness of contacts: a limit from the damping of the device, plus a limit from the damping of each contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StableStiffness {
-    /// Stiffness that the damping of the device keeps stable, N/m, of all contacts in one direction together; 0: its damping is not
-    /// known, and contacts without damping keep their stiffness.
+    /// Maximum stable stiffness with the damping of the device, N/m, for all contacts in one direction together; 0: the damping
+    /// is unknown, and contacts without damping are not reduced.
     pub by_device_n_per_m: f64,
     /// Additional stiffness for the damping of a contact, 1/s.
     pub per_damping_1_per_s: f64,
@@ -28,11 +28,10 @@ impl StableStiffness {
     }
 }
 
-/// Stiffness of published contacts, as far as the loop has to reduce it.
+/// Reduction of the stiffness of published contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeltStiffness {
-    /// Stiffness that a contact asked for, N/m, and the stiffness that it got, where they differ most; `None` without
-    /// a reduction.
+    /// Requested and rendered stiffness of the contact with the largest reduction, N/m; `None` without a reduction.
     pub reduced_n_per_m: Option<[f64; 2]>,
     /// Largest stiffness of a contact for which no damping is known, N/m; 0 without such a contact.
     pub undamped_n_per_m: f64,
@@ -54,14 +53,14 @@ pub struct Touch {
     pub wrench: Wrench,
     /// True for the wrench of a valid set, solved to rounding and within the limits.
     pub is_valid: bool,
-    /// Shortcoming of the tick; `None` for a tick as it should be.
+    /// Shortcoming of the tick; `None` without one.
     pub shortcoming: Option<Shortcoming>,
 }
 
 /// Newest contacts of a model, with the state of their springs.
 pub struct PublishedContacts {
     solver: Solver,
-    /// Age at which a set without a validity of its own begins to fade, s.
+    /// Age at which a set that declares no validity time begins to fade, s.
     valid_s: f64,
     stable: StableStiffness,
     felt: FeltStiffness,
@@ -70,14 +69,14 @@ pub struct PublishedContacts {
 }
 
 impl PublishedContacts {
-    /// Creates the state before the first contact. A contact is at most as stiff as known damping keeps `stable`; a set without a
-    /// validity of its own is valid for `valid_s`. Not real-time.
+    /// Creates the state before the first contact. The stiffness of a contact is limited to `stable`; a set that declares no
+    /// validity time is valid for `valid_s`. Not real-time.
     #[must_use]
     pub fn new(solver: Solver, stable: StableStiffness, valid_s: f64) -> Self {
         Self { solver, valid_s, stable, felt: FeltStiffness::default(), published_ns: None }
     }
 
-    /// Checks a set, which the next tick uses; a set that is refused changes nothing. Real-time: bounded, no allocation.
+    /// Checks a set and uses it from the next tick on; a rejected set changes nothing. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// As [`ContactSet::new`].
@@ -92,7 +91,8 @@ impl PublishedContacts {
         Ok(())
     }
 
-    /// Returns a contact with as much stiffness as its damping, and its share of the device's, keep stable.
+    /// Returns a contact with its stiffness limited to the stable stiffness, from its damping and its share of the device's
+    /// damping.
     fn reduced(&mut self, contact: Contact, share: f64) -> Contact {
         let Contact { stiffness_n_per_m, damping_ns_per_m, .. } = contact;
         let Some(most_n_per_m) = self.stable.most_n_per_m(damping_ns_per_m, share) else {
@@ -131,13 +131,13 @@ impl PublishedContacts {
         self.solver.is_empty()
     }
 
-    /// Returns what the hand has felt of the stiffness so far. Real-time: bounded, no allocation.
+    /// Returns the reductions of stiffness so far. Real-time: bounded, no allocation.
     #[must_use]
     pub fn felt_stiffness(&self) -> FeltStiffness {
         self.felt
     }
 
-    /// Forgets all contacts: without force until the next set. Real-time: bounded, no allocation.
+    /// Removes all contacts: no force until the next set. Real-time: bounded, no allocation.
     pub fn clear(&mut self) {
         self.solver.clear();
         self.published_ns = None;
@@ -152,7 +152,7 @@ fn share(contact: &Contact, all: &[Contact]) -> f64 {
 }
 
 impl FeltStiffness {
-    /// Keeps a reduction if it is the largest so far.
+    /// Records a reduction if it is the largest so far.
     fn note(&mut self, pair: [f64; 2]) {
         let loss = |[asked, felt]: [f64; 2]| asked / felt;
         if self.reduced_n_per_m.is_none_or(|known| loss(pair) > loss(known)) {

@@ -1,8 +1,8 @@
-//! Change from a set to the next without energy of its own.
+//! Replacement of a contact set by the next one without adding energy.
 //!
 //! The springs of a contact that both sets have keep their compression; the difference to the depth in the new set is withheld,
-//! as an offset of the gap. A contact that only the new set has is withheld whole, one that only the old set has fades. Then
-//! every withheld part falls to 0 at a rate that needs half the time between two sets, 20 ms at the most:
+//! as an offset of the gap. A contact of the new set only is withheld entirely; a contact of the old set only fades. Then every
+//! withheld part falls to 0 at a rate that needs half the time between two sets, 20 ms at the most:
 //!
 //! - a part that is below 0, or fades, loses energy as it falls;
 //! - a part above 0 gains energy, and falls only as far as the [`Balance`] pays for it; without a touching spring it costs
@@ -12,30 +12,31 @@ use crate::linear::{self, Symmetric6, Vector6, dot};
 use crate::slot::{Role, Slot};
 use flotor_hal::{Pose, Wrench};
 
-/// How a set takes the place of another.
+/// Manner of replacing a contact set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Replacement {
-    /// At once: the force jumps, and the difference of the stored energies goes into the hand.
+    /// Immediate: the force jumps, and the hand receives the difference of the stored energies.
     Immediate,
-    /// Without energy of its own, and without jumps: motion of the hand and of the declared surfaces pay for all energy.
+    /// Energy-conserving, without jumps: all energy comes from the motion of the hand and the declared motion of the surfaces.
     Conserving {
-        /// Largest power of the declared motion of a surface that counts, W for each contact. A surface with more moves slower.
+        /// Maximum power of the declared motion of a surface, W per contact; a surface with more power moves more slowly.
         surface_power_w: f64,
     },
 }
 
 /// Longest time over which a change of force is spread, s.
 pub(crate) const LONGEST_SPREAD_S: f64 = 0.02;
-/// Largest balance, J: what dissipated long ago pays for nothing.
+/// Maximum balance, J: energy dissipated long ago is not available.
 const LARGEST_J: f64 = 0.01;
-/// Power that the balance gains from nothing, W: 0.1 mJ a minute, above all rounding.
+/// Power added to the balance to cover rounding errors, W: 0.1 mJ per minute.
 const DRIFT_W: f64 = 0.1e-3 / 60.0;
 
-/// Energy that the hand and the declared surfaces have put in, less what the springs store: what has been dissipated.
+/// Dissipated energy: work of the hand and of the declared surfaces less the energy stored in the springs.
 ///
 /// The force of a tick acts until the next tick. A spring of stiffness `k` that is moved by `d` meanwhile takes `k d^2 / 2` less
 /// from the hand than it stores, in both directions, as in every sampled loop (J. Colgate, G. Schenkel, "Passivity of a class of
-/// sampled-data systems", J. Robotic Systems 14(1), 1997). That energy is credited, so that the balance of springs stays 0.
+/// sampled-data systems", J. Robotic Systems 14(1), 1997). This energy is credited, so that the balance of an ideal spring stays
+/// 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Balance {
     available_j: f64,
@@ -62,7 +63,7 @@ impl Balance {
         self.pose.as_ref()
     }
 
-    /// Notes a tick without a solve: its motion is not known, and pays for nothing.
+    /// Records a tick without a solve: its motion is unknown and adds no energy.
     pub(crate) fn interrupt(&mut self) {
         self.is_interrupted = true;
     }
@@ -81,12 +82,12 @@ impl Balance {
         self.pose = Some(*pose);
     }
 
-    /// Adds work of a surface, or the credit of a sampled spring.
+    /// Adds the work of a surface, or the credit of a sampled spring, J.
     pub(crate) fn add(&mut self, energy_j: f64) {
         self.available_j += energy_j;
     }
 
-    /// Subtracts what is stored in addition after a solve; `wrench` acts until the next tick.
+    /// Subtracts the increase of the stored energy after a solve; `wrench` acts until the next tick.
     pub(crate) fn settle(&mut self, offset: &Vector6, slots: &[Slot], wrench: &Wrench) {
         let stored_j = energy_j(offset, slots);
         self.available_j = (self.available_j - (stored_j - self.stored_j)).min(LARGEST_J);
@@ -95,7 +96,7 @@ impl Balance {
     }
 }
 
-/// Energy that springs, sampled once in a tick, take less from a hand than they store.
+/// Energy credit of springs sampled once per tick: the excess of their stored energy over the work of the hand.
 ///
 /// It is `k d^2 / 2` of the stiffness felt behind the coupling: the least energy over all changes of the offset.
 #[derive(Clone, Copy, Debug)]
@@ -129,8 +130,8 @@ pub(crate) fn energy_j(offset: &Vector6, slots: &[Slot]) -> f64 {
     0.5 * dot(offset, offset) + slots.iter().map(Slot::stored_j).sum::<f64>()
 }
 
-/// Lets the withheld part of a contact fall in a tick; `whole_m` is its depth with this part. Returns the energy that this took
-/// of the available.
+/// Reduces the withheld part of a contact in one tick; `whole_m` is the depth including this part. Returns the energy used of
+/// `available_j`, J.
 #[inline]
 pub(crate) fn relax(slot: &mut Slot, whole_m: f64, available_j: f64) -> f64 {
     if slot.role == Role::Fading {
@@ -141,7 +142,7 @@ pub(crate) fn relax(slot: &mut Slot, whole_m: f64, available_j: f64) -> f64 {
         slot.withheld_m = (slot.withheld_m + slot.rate_m).min(0.0);
         return 0.0;
     }
-    // Behind a coupling the solve moves the tool once more: as far again as this motion changes the depth, to be safe.
+    // Behind a coupling the solve moves the tool again: allow for twice the change of depth.
     let depth_m = (whole_m - slot.withheld_m).max(0.0);
     let depth_m = depth_m.max(slot.depth_m) + (depth_m - slot.depth_m).abs();
     let stiffness = slot.contact.stiffness_n_per_m;
@@ -158,11 +159,12 @@ pub(crate) fn relax(slot: &mut Slot, whole_m: f64, available_j: f64) -> f64 {
     cost_j(fall_m)
 }
 
-/// Farthest point of the tool, m, and smallest cosine between normals (8 degrees), at which two contacts are one.
+/// Largest distance of the points on the tool, m, and smallest cosine between the normals (8 degrees), for which two contacts are
+/// the same.
 const SAME_POINT_M: f64 = 0.01;
 const SAME_NORMAL: f64 = 0.99;
 
-/// Returns the closest of the old contacts, each only once.
+/// Removes and returns the closest matching old contact.
 pub(crate) fn take_closest(old: &mut [Slot], slot: &Slot) -> Option<Slot> {
     let mut least = 1.0;
     let mut closest = None;

@@ -1,4 +1,4 @@
-//! A contact in the loop: its plane, its friction, and the part of its gap that is withheld.
+//! State of a contact in the loop: plane, friction, and withheld part of the depth.
 
 use crate::cap::{OffsetSpace, Spring};
 use crate::contact::Contact;
@@ -7,12 +7,12 @@ use crate::linear::{Vector6, dot};
 use crate::newton::{Rows, Term};
 use flotor_hal::{DVec3, Pose, Twist};
 
-/// Part of a slot in the newest set.
+/// Role of a slot in the newest set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Role {
     /// A contact of the set.
     Live,
-    /// A contact of a set before, whose force fades.
+    /// A contact of an earlier set, whose force fades.
     #[default]
     Fading,
 }
@@ -24,23 +24,23 @@ pub(crate) struct Slot {
     pub(crate) contact: Contact,
     tangents: [DVec3; 2],
     arm_at_anchor_m: DVec3,
-    /// Gap of a point of the tool at the origin of the scene; falls as the surface moves.
+    /// Gap of a point of the tool at the origin of the scene, m; changes as the surface moves.
     gap_at_origin_m: f64,
-    /// Part of the depth without a force; below 0, force without depth.
+    /// Part of the depth without a force, m; below 0, force without depth.
     pub(crate) withheld_m: f64,
-    /// Largest change of the withheld part in a tick.
+    /// Maximum change of the withheld part in a tick, m.
     pub(crate) rate_m: f64,
-    /// Place of the point of the tool in the last solve, without the offset.
+    /// Position of the point of the tool in the last solve, without the offset, m.
     pub(crate) last_m: DVec3,
-    /// Motion of the surface since the last solve.
+    /// Motion of the surface since the last solve, m.
     travel_m: DVec3,
-    /// Compression of the spring in the last solve.
+    /// Compression of the spring in the last solve, m.
     pub(crate) depth_m: f64,
-    /// Force along the normal in the last solve.
+    /// Normal force in the last solve, N.
     pub(crate) normal_n: f64,
-    /// Force on the tool in the last solve.
+    /// Force on the tool in the last solve, N.
     pub(crate) force: DVec3,
-    /// Stretch of the tangential spring after the last solve.
+    /// Stretch of the tangential spring after the last solve, m.
     pub(crate) stretch_m: DVec3,
     /// Point of the surface to which the tangential spring is fixed; none before the first solve.
     pub(crate) anchor_m: Option<DVec3>,
@@ -63,14 +63,14 @@ impl Slot {
         }
     }
 
-    /// Returns the derivatives by the coordinates of the offset, with the arm that the tool has at the anchor: so the energy
-    /// depends on the pose through the gaps alone, and the wrench is its gradient.
+    /// Returns the derivatives of gap and stretch with respect to the coordinates of the offset. The lever arm is constant, that
+    /// at the anchor: the energy then depends on the pose through the gaps alone, and the wrench is its gradient.
     pub(crate) fn rows(&self, space: &OffsetSpace) -> Rows {
         let row = |direction: DVec3| space.coordinates(direction, self.arm_at_anchor_m.cross(direction));
         Rows { normal: row(self.contact.normal), tangents: self.tangents.map(row) }
     }
 
-    /// Moves the surface.
+    /// Moves the surface by `travel_m`.
     #[inline]
     pub(crate) fn advance(&mut self, travel_m: DVec3) {
         self.travel_m = travel_m;
@@ -78,7 +78,8 @@ impl Slot {
         self.anchor_m = self.anchor_m.map(|anchor_m| anchor_m + travel_m);
     }
 
-    /// Returns the depth of a point of the tool, and the stretch of its tangential spring, without offset and withheld part.
+    /// Returns the depth of a point of the tool and the stretch of its tangential spring, m, without the offset and the withheld
+    /// part.
     #[inline]
     pub(crate) fn reach(&self, point_m: DVec3) -> (f64, [f64; 2]) {
         let anchor_m = self.anchor_m.unwrap_or(point_m);
@@ -105,14 +106,14 @@ impl Slot {
         }
     }
 
-    /// Returns how far the handle has moved the point of the tool against the surface since the last solve.
+    /// Returns the motion of the point of the tool relative to the surface since the last solve, m.
     #[inline]
     pub(crate) fn motion_m(&self, point_m: DVec3) -> DVec3 {
         point_m - self.last_m - self.travel_m
     }
 
-    /// Keeps the force at a solved offset, and moves the anchor as far as the contact slides: the stretch that is left has no
-    /// more energy than before. Returns true if it slides.
+    /// Stores the force at a solved offset, and moves the anchor as far as the contact slides, which never increases the energy
+    /// of the stretch. Returns true if the contact slides.
     #[inline]
     pub(crate) fn settle(&mut self, term: &Term, offset: &Vector6, point_m: DVec3) -> bool {
         let (depth_m, [first, second]) = term.at(offset);
@@ -122,7 +123,7 @@ impl Slot {
         self.normal_n = term.normal.at(depth_m).0;
         self.depth_m = if depth_m > 0.0 { depth_m } else { 0.0 };
         if depth_m < 0.0 && self.withheld_m > 0.0 {
-            // The spring does not touch: what is withheld beyond the tool costs nothing.
+            // No contact: reduce the withheld part by the gap, which needs no energy.
             self.withheld_m = (self.withheld_m + depth_m).max(0.0);
         }
         self.stretch_m = (along_first * first + along_second * second) * friction.held;
@@ -133,14 +134,14 @@ impl Slot {
         friction.sliding.is_some()
     }
 
-    /// Fixes the tangential spring where its stretch is that of this slot.
+    /// Places the anchor of the tangential spring so that its stretch is that of this slot.
     pub(crate) fn fix(&mut self, rows: &Rows, offset: &Vector6, point_m: DVec3) {
         let [first, second] = rows.tangents.each_ref().map(|tangent| dot(tangent, offset));
         let [along_first, along_second] = self.tangents;
         self.anchor_m = Some(point_m + along_first * first + along_second * second - self.stretch_m);
     }
 
-    /// Takes over spring and friction of a contact in whose place this one comes: the same forces, but no more energy.
+    /// Takes over the springs of the contact that this one replaces: equal forces, without more energy.
     pub(crate) fn inherit(&mut self, old: &Slot) {
         let ratio = old.contact.stiffness_n_per_m / self.contact.stiffness_n_per_m;
         self.depth_m = old.depth_m * if ratio < 1.0 { ratio } else { ratio.sqrt() };
@@ -153,7 +154,7 @@ impl Slot {
         self.anchor_m = old.anchor_m;
     }
 
-    /// Withholds the part of a depth that the spring does not have; it may change in so many ticks.
+    /// Withholds the part of a depth beyond the compression of the spring; this part fades over `ticks`.
     pub(crate) fn withhold(&mut self, whole_m: f64, ticks: f64) {
         let depth_m = whole_m - self.depth_m;
         self.withheld_m = if self.depth_m > 0.0 { depth_m } else { depth_m.max(0.0) };
@@ -161,7 +162,7 @@ impl Slot {
         self.rate_m = self.rate_m.max(change_m / ticks);
     }
 
-    /// Returns true for an old contact whose force has ended.
+    /// Returns true for an old contact whose force has faded.
     pub(crate) fn has_faded(&self) -> bool {
         self.role == Role::Fading && self.depth_m <= 0.0
     }

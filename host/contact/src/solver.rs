@@ -11,7 +11,7 @@ use crate::replacement::{
 use crate::slot::{Role, Slot};
 use flotor_hal::{DVec3, MAX_CONTACTS, Pose, Twist, Wrench};
 
-/// How a solve ended.
+/// Outcome of a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The wrench is that of the minimum, to rounding.
@@ -27,7 +27,7 @@ pub enum Outcome {
 pub struct Solution {
     /// Wrench on the hand at the handle, scene frame, within the limits.
     pub wrench: Wrench,
-    /// How the solve ended.
+    /// Outcome of the solve.
     pub outcome: Outcome,
     /// Number of Newton steps.
     pub steps: u32,
@@ -37,7 +37,7 @@ pub struct Solution {
     pub is_in_range: bool,
 }
 
-/// Contacts of the set, and as many of sets before whose force fades.
+/// Number of slots: the contacts of a set, and equally many fading contacts of earlier sets.
 const SLOTS: usize = 2 * MAX_CONTACTS;
 
 /// Contact set behind a coupling, with its friction.
@@ -47,7 +47,7 @@ pub struct Solver {
     replacement: Replacement,
     period_s: f64,
     set: ContactSet,
-    /// Set that the next solve is to use.
+    /// Set for the next solve.
     next: Option<ContactSet>,
     space: OffsetSpace,
     slots: [Slot; SLOTS],
@@ -100,12 +100,12 @@ impl Solver {
         }
     }
 
-    /// Forgets all contacts, their friction and their energy. Real-time: bounded, no allocation.
+    /// Removes all contacts with their friction and energy. Real-time: bounded, no allocation.
     pub fn clear(&mut self) {
         *self = Self::empty(self.coupling, self.limits, self.replacement, self.period_s);
     }
 
-    /// Returns true if the last solve had no contact, and no other set waits. Real-time: bounded, no allocation.
+    /// Returns true if the last solve had no contact and no new set is pending. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0 && self.next.is_none()
@@ -162,7 +162,7 @@ impl Solver {
             let (wrench, outcome) = (Wrench::ZERO, Outcome::InvalidInput);
             return Solution { wrench, outcome, steps: 0, is_limited: false, is_in_range: false };
         }
-        // Before the work of this tick, of which the springs will store a part.
+        // Read before the work of this tick is added: the springs store a part of this work.
         let available_j = self.balance.available_j();
         let next = self.next.take();
         let elapsed_s = if next.is_some() { self.period_s } else { (age_s - self.last_age_s).max(0.0) };
@@ -224,7 +224,7 @@ impl Solver {
             }
             let depth_m = whole_m - slot.withheld_m;
             let normal = slot.normal_law(arm_m, twist, self.period_s);
-            // Without an offset the normal force of this tick is known before the friction; else that of the last solve is used.
+            // Without an offset the normal force of this tick is known before the friction; otherwise use that of the last solve.
             let normal_n = if self.space.is_rigid() { normal.at(depth_m).0 } else { slot.normal_n };
             *term =
                 Term { rows: term.rows, depth_m, stretch_m, normal, friction: slot.friction_law(normal_n) };
@@ -238,7 +238,7 @@ impl Solver {
         minimize(self.terms.get(..self.count).unwrap_or_default(), &self.offset, MAX_STEPS)
     }
 
-    /// Keeps the forces at the solved offset, and returns their sum.
+    /// Stores the forces at the solved offset, and returns their sum.
     fn settle(&mut self, pose: &Pose) -> Wrench {
         let is_conserving = self.is_conserving();
         let (mut load, mut sampled) = (Wrench::ZERO, SampledMotion::NONE);
@@ -250,7 +250,7 @@ impl Solver {
             if is_conserving && (is_touching || slot.depth_m > 0.0) {
                 let [first, second] = &term.rows.tangents;
                 let rows = [&term.rows.normal, first, second];
-                // Across the normal a contact that slides has no spring.
+                // A sliding contact has no tangential spring.
                 let count = if is_sliding { 1 } else { 3 };
                 for (spring, row) in slot.springs().into_iter().zip(rows).take(count) {
                     sampled.add(spring.stiffness_n_per_m, spring.direction.dot(motion_m), row);
@@ -264,7 +264,7 @@ impl Solver {
         load
     }
 
-    /// Lets all forces fade once a set is too old.
+    /// Fades all forces once a set is too old.
     fn expire(&mut self, age_s: f64) {
         if !self.is_conserving() || self.set.is_valid_for(age_s) {
             return;
@@ -276,7 +276,7 @@ impl Solver {
         }
     }
 
-    /// Replaces the set at the pose of the last solve, with all surfaces where they are now.
+    /// Replaces the set at the pose of the last solve, with the surfaces at their present positions.
     fn exchange(&mut self, set: &ContactSet, pose: &Pose, age_s: f64) {
         let pose = self.balance.pose().copied().unwrap_or(*pose);
         let mut old = self.slots;
@@ -335,7 +335,7 @@ impl Solver {
         }
     }
 
-    /// Shortens all springs in one ratio if they and the coupling would store more than before.
+    /// Scales all springs down by one factor if springs and coupling would store more energy than before.
     fn shrink_to_stored(&mut self) {
         let slots = self.slots.get_mut(..self.count).unwrap_or_default();
         let (before_j, now_j) = (self.balance.stored_j(), energy_j(&self.offset, slots));

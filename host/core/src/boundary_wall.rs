@@ -12,6 +12,7 @@ use flotor_hal::{DVec3, DeviceState, Wrench, math, rotation_vector};
 use std::f64::consts::PI;
 
 /// Boundary wall of one device.
+#[derive(Clone)]
 pub struct BoundaryWall {
     position: Ellipsoid,
     rotation: Ellipsoid,
@@ -87,6 +88,7 @@ fn by_turning(rotation_rad: DVec3, gradient: DVec3) -> DVec3 {
 }
 
 /// Range of positions (m, N) or of rotation vectors (rad, N·m), with spring and damper outside.
+#[derive(Clone)]
 struct Ellipsoid {
     /// Infinite on an axis without a range: such an axis is ignored.
     semi_axes: DVec3,

@@ -72,7 +72,7 @@ pub struct ModelHealth {
 }
 
 impl ModelHealth {
-    /// Returns true without a problem to report; late replies and what a [notice](Self::notice) says are no problem.
+    /// Returns true without a problem to report; late replies and what a [notice](Self::notice) says are not problems.
     #[must_use]
     pub fn is_good(&self) -> bool {
         *self == Self { late_answers: self.late_answers, contacts: self.contacts, ..Self::default() }
@@ -126,22 +126,21 @@ impl ModelHealth {
         let ContactHealth { aged, unsolved, reduced_n_per_m, undamped_n_per_m } = self.contacts;
         let reduced = reduced_n_per_m.map(|[asked, felt]| {
             format!(
-                "have {felt:.0} N/m instead of {asked:.0}, the most that device and damping keep stable (`cap = false` in \
-                 `[model.field]` renders all of it)"
+                "have {felt:.0} N/m instead of {asked:.0}, the largest stable stiffness with the known damping (`cap = false` in \
+                 `[model.field]` renders the full stiffness)"
             )
         });
         let undamped = (undamped_n_per_m > 0.0).then(|| {
             format!(
                 "have no damping up to {undamped_n_per_m:.0} N/m, so only hand and device keep them stable \
-                 (`damping_ns_per_m` in `[device]` limits them to what the device keeps stable)"
+                 (`damping_ns_per_m` in `[device]` limits them to the stable stiffness)"
             )
         });
         let aged = aged.map(|ticks, first| {
-            format!("were older than they are valid in {ticks} ticks, the first at tick {first}, and faded")
+            format!("exceeded their validity time in {ticks} ticks, the first at tick {first}, and faded")
         });
-        let unsolved = unsolved.map(|ticks, first| {
-            format!("were not solved to rounding in {ticks} ticks, the first at tick {first}")
-        });
+        let unsolved = unsolved
+            .map(|ticks, first| format!("did not converge in {ticks} ticks, the first at tick {first}"));
         let parts: Vec<_> = [reduced, undamped, aged, unsolved].into_iter().flatten().collect();
         (!parts.is_empty()).then(|| format!("the contacts of `{model}` {}", parts.join(", ")))
     }

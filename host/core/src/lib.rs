@@ -7,12 +7,14 @@
 //!   that limits allow.
 //! - [`broad_phase`]: the models that can act at a position.
 //! - [`asynchronous`]: timing of an asynchronous model, and the limits of its contacts.
+//! - [`run_state`]: the states of a run, and the force that may pass in each.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
 //! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
 //!   felt; [`weight`]: the weight of a model that fades.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
-//! - [`health`]: problems of a model, counted and as text.
+//! - [`tally`]: statistics of the ticks of a run; [`health`]: problems of a model, counted and as text.
 //! - [`guidance`]: the parameters that guide a simulated hand.
+//! - [`parameter_change`]: a change of a parameter in the loop, and [`gradual`] its movement to the new value.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
 //! - [`fade()`]: smooth step of a force; [`civil_date()`]: date of a day.
 //! - [`words`], [`sent`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
@@ -31,6 +33,7 @@ pub mod demand;
 pub mod end_wall;
 mod fade;
 pub mod feel;
+pub mod gradual;
 pub mod grip;
 pub mod grip_guard;
 pub mod guidance;
@@ -40,6 +43,7 @@ mod lock;
 pub mod mapping;
 pub mod oscillation;
 mod outputs;
+pub mod parameter_change;
 pub mod peer;
 pub mod plausibility;
 mod plugin_index;
@@ -47,7 +51,9 @@ mod quantile;
 mod random;
 pub mod region;
 pub mod rendered_boundary;
+pub mod run_state;
 pub mod sent;
+pub mod tally;
 pub mod trace;
 pub mod weight;
 pub mod words;

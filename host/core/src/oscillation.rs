@@ -83,6 +83,7 @@ enum Stage {
 }
 
 /// Detector of oscillations in the limited force of one device.
+#[derive(Clone)]
 pub struct Oscillation {
     force: Swing,
     torque: Swing,

@@ -77,7 +77,7 @@ impl Region {
         // By the largest component: the square of a length may overflow.
         let largest = vector.abs().max_element();
         let of_radius = (vector / largest).length() * (largest / self.radius);
-        // 0/0 on an axis that is not driven is no excess; nor is that of a zero vector.
+        // 0/0 on an axis that is not driven is not an excess; nor is that of a zero vector.
         (vector.abs() / self.half_sides).to_array().into_iter().chain([of_radius]).fold(0.0, f64::max)
     }
 

@@ -4,7 +4,7 @@ use crate::limits::{Bound, Boundary};
 use flotor_hal::{Capabilities, Damper, SampledLoop};
 use std::fmt::{self, Display, Formatter};
 
-/// Force that the wall withstands inside the range of a device, N, if device and scene allow that much.
+/// Design load of the wall inside the range of a device, N, limited by device and scene.
 pub const DESIGN_FORCE_N: f64 = 5.0;
 
 /// Ratio of the depth under a suddenly applied force to the depth under the same force at rest.
@@ -95,7 +95,7 @@ impl RenderedBoundary {
         if self.damping_ns_per_m <= 0.0 && self.stiffness_n_per_m > 0.0 {
             parts.push("has no damper, so only the damping of the device can keep it stable".to_owned());
         }
-        // Rounding of a quotient is no shortfall.
+        // Rounding of a quotient is not a shortfall.
         if self.holds_n < self.wanted_n * (1.0 - 1.0e-9) {
             parts.push(format!(
                 "withstands {:.1} N instead of {:.1} N, because it begins at half of the range",

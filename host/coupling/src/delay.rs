@@ -3,6 +3,7 @@
 use super::PeerState;
 
 /// Delay line: returns each state a fixed number of ticks later, in order.
+#[derive(Clone)]
 pub(super) struct DelayLine {
     /// One place for each tick of delay; empty without a delay.
     places: Box<[Option<PeerState>]>,

@@ -19,6 +19,7 @@ const DRAWN: f64 = 0.1;
 const RETURN_S: f64 = 0.1;
 
 /// Local end of a coupling: virtual spring and damper at one device, limited by an energy tank.
+#[derive(Clone)]
 pub struct End {
     config: CouplingConfig,
     /// Mapping from the device's frame to the shared frame.

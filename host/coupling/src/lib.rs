@@ -73,6 +73,7 @@ pub struct Pull {
 }
 
 /// Coupling of two devices of one loop.
+#[derive(Clone)]
 pub struct Coupling {
     ends: [End; 2],
     /// Peer states under way to the end with the same index.

@@ -23,6 +23,7 @@ fn reserve_j(period_s: f64) -> f64 {
 }
 
 /// Passivity observer of one port, with an optional passivity controller.
+#[derive(Clone)]
 pub struct Passivity {
     mode: PassivityMode,
     controller: Controller,

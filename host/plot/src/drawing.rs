@@ -144,7 +144,7 @@ fn bar_outline(bins: &[Bin], projection: &Projection, floor: f64) -> Vec<Option<
     let mut reached: Option<f64> = None;
     let drawable = |bin: &Bin| bin.edges(projection.x.scale).zip(projection.y.scale.forward(bin.height));
     for ((left, right), height) in bins.iter().filter_map(drawable) {
-        // Equal edges may differ by rounding errors: a hundredth of a pixel is no gap.
+        // Equal edges may differ by rounding errors: a hundredth of a pixel is not a gap.
         let touches = reached.is_some_and(|end| (left - end).abs() < 0.01 * projection.column());
         if !touches {
             if let Some(end) = reached {

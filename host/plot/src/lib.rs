@@ -8,7 +8,7 @@
 //! - **No peak is lost, no file is large.** Lines are reduced to at most four samples per pixel column (`decimate`, after Jugel et
 //!   al., "M4", VLDB 2014), so the file size for ten minutes at 1 kHz is that for a second. A [`Trace`] reduces samples as they
 //!   arrive: its memory does not grow with the run.
-//! - **Rounding is no signal.** An axis covers at least a range that is far above the rounding errors of its [`Quantity`].
+//! - **Rounding is not a signal.** An axis covers at least a range that is far above the rounding errors of its [`Quantity`].
 //! - **Every series is visible.** A line that later lines cover is drawn wider and paler (`cover`).
 //! - **Bad samples stay local.** NaN, infinity, and anything not positive on a log axis break the line there and change neither the
 //!   axis range nor the rest of the curve.

@@ -45,7 +45,7 @@ impl Coverage {
 /// neither on the machine nor on the batches in which records arrive; a part that the digest does not [cover](Coverage)
 /// counts as zero. The words of a grip count for devices with a grip only. All NaNs count as equal and zero has no sign, because they
 /// differ between processors and compilers.
-/// The digest distinguishes runs, but is not cryptographic: it is no protection against forgery.
+/// The digest distinguishes runs, but is not cryptographic: it is not a protection against forgery.
 #[derive(Clone, Default)]
 #[must_use]
 pub struct TraceDigest {

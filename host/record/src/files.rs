@@ -21,7 +21,7 @@ const HASH_PREFIX: &str = "xxh3:";
 pub struct NamedFile {
     /// Absolute path.
     pub path: PathBuf,
-    /// xxh3-64 hash of the content. The hash distinguishes files, but is not cryptographic: it is no protection against
+    /// xxh3-64 hash of the content. The hash distinguishes files, but is not cryptographic: it is not a protection against
     /// forgery.
     pub hash: u64,
 }

@@ -263,7 +263,7 @@ enum Level {
     Fatal = 5,
 }
 
-/// Defines enumerations of the schema, with the name of 0 if 0 is no value, and their conversion from and to the value of a field.
+/// Defines enumerations of the schema, with the name of 0 if 0 is not a value, and their conversion from and to the value of a field.
 macro_rules! enumerations {
     ($($wire:ident $(($none:ident))? of $value:ident { $($name:ident = $number:tt),+ })+) => {
         $(#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]

@@ -42,6 +42,7 @@ impl SpinWindow {
 }
 
 /// Schedule of the ticks of a loop, on one of three time bases.
+#[derive(Clone, Copy)]
 pub struct Schedule {
     pace: Pace,
     period_ns: u64,
@@ -53,6 +54,7 @@ pub struct Schedule {
 }
 
 /// Time base of the ticks.
+#[derive(Clone, Copy)]
 enum Pace {
     /// Virtual clock, without waiting.
     Virtual,
@@ -202,6 +204,11 @@ impl Schedule {
             Pace::Clock(window) => self.next_time_ns() + self.wait_for_deadline(window).late_ns,
             Pace::Device { .. } => monotonic_ns() - self.start_ns,
         }
+    }
+
+    /// Returns true on the virtual clock.
+    pub(crate) fn is_virtual(&self) -> bool {
+        matches!(self.pace, Pace::Virtual)
     }
 
     /// Returns the index of the next tick; indices count from 0, without gaps for missed ticks.

@@ -1,7 +1,7 @@
 //! Safety envelope: the stages between models and device that every command passes.
 //!
 //! Order: guard (a wrench with a non-finite number becomes zero) -> gate (the start-up ramp and the other [states of the
-//! run](super::state)) -> velocity limit -> [boundary wall](flotor_core::boundary_wall) -> force and torque limits -> [damping of an
+//! run](flotor_core::run_state)) -> velocity limit -> [boundary wall](flotor_core::boundary_wall) -> force and torque limits -> [damping of an
 //! oscillation](flotor_core::oscillation) -> [passivity](flotor_coupling::passivity), and the limits once more if the controller has changed
 //! the wrench -> slew limit.
 //!
@@ -9,7 +9,6 @@
 //! component that accelerates the handle may fall faster. The limits hold after the slew limit too: a wrench that it has changed is
 //! limited to the [regions](flotor_core::region) once more.
 
-use super::state::Gate;
 use flotor_core::boundary_wall::BoundaryWall;
 use flotor_core::grip::GripRecord;
 use flotor_core::grip_guard::GripGuard;
@@ -17,6 +16,7 @@ use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::oscillation::Oscillation;
 use flotor_core::region::Region;
 use flotor_core::rendered_boundary::RenderedBoundary;
+use flotor_core::run_state::Gate;
 use flotor_core::trace::Events;
 use flotor_coupling::passivity::Passivity;
 use flotor_coupling::port_energy::{Controller, PortObserver};
@@ -43,6 +43,7 @@ pub struct EnvelopeEffects {
 
 /// Safety envelope of one device: limits of force, torque, velocity and slew rate, boundary wall, damping of oscillations, and
 /// passivity controller.
+#[derive(Clone)]
 pub struct Envelope {
     /// Limit of the force, N.
     force: Region,

@@ -3,13 +3,15 @@
 //! Servo and replay run the same code, so that a replay can be bit-exact.
 
 use super::models::{
-    Body, Contribution, Kind, Layer, LayerReport, ModelStack, Replacement, Sample, SharedSlot, Slot,
-    limit_observable,
+    Body, Contribution, Kind, Layer, LayerReport, ModelStack, Objects, Replacement, Sample, SavedSlot,
+    SharedObject, SharedSlot, Slot, limit_observable,
 };
 use super::port::Port;
-use super::{Heartbeat, Place};
+use super::{Heartbeat, Place, Unsaved};
+use flotor_core::PluginIndex;
 use flotor_core::demand::TickDemand;
 use flotor_core::health::ModelHealth;
+use flotor_core::weight::Fade;
 use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Line, LinkStatistics, LinkTimeouts, PortSample, Pull, Reach,
     RemoteEnd, Tank, TankState,
@@ -138,6 +140,16 @@ enum Whereabouts {
     },
     /// Among the shared models, at this index.
     Shared(usize),
+}
+
+/// Saved state of all models and couplings.
+pub(crate) struct SavedForces {
+    /// States of all instances, in the order of [`Forces::states`].
+    instances: Vec<Vec<u8>>,
+    slots: Vec<SavedSlot<Objects>>,
+    shared: Vec<SavedSlot<SharedObject>>,
+    gains: Vec<Fade>,
+    couplings: Vec<(Box<Coupling>, [Pull; 2])>,
 }
 
 /// Models and couplings of a run.
@@ -298,6 +310,79 @@ impl Forces {
         let shared = self.shared.iter_mut().map(|shared| &mut shared.slot);
         let on_devices = on_devices.flat_map(move |slot| numbered_states(slot, tick));
         on_devices.chain(shared.flat_map(move |slot| numbered_states(slot, tick)))
+    }
+
+    /// Saves the state of all models and couplings before a tick; the run has `devices` devices. Not real-time.
+    pub(crate) fn save(&mut self, devices: usize, tick: u64) -> Result<SavedForces, Unsaved> {
+        let plugin = |model| PluginIndex::of_model(devices, model);
+        let instance = |(model, state): (usize, Option<InstanceState<'_>>)| {
+            state.and_then(|mut state| state.to_bytes()).ok_or(Unsaved::Plugin(plugin(model)))
+        };
+        let instances = self.states(tick).map(instance).collect::<Result<_, _>>()?;
+        let coupling = |coupled: &Coupled| match coupled {
+            Coupled::Here { coupling, pulls, .. } => Ok((coupling.clone(), *pulls)),
+            Coupled::Remote { .. } => Err(Unsaved::Remote),
+        };
+        let Self { stacks, shared, couplings, .. } = self;
+        let slots = stacks.iter_mut().flat_map(|stack| &mut stack.slots);
+        Ok(SavedForces {
+            instances,
+            slots: slots.map(|slot| slot.save(plugin(slot.number))).collect::<Result<_, _>>()?,
+            shared: (shared.iter_mut().map(|shared| shared.slot.save(plugin(shared.slot.number))))
+                .collect::<Result<_, _>>()?,
+            gains: stacks.iter_mut().flat_map(ModelStack::gains).map(|gain| *gain).collect(),
+            couplings: couplings.iter().map(coupling).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Restores the state of all models and couplings before a tick. Not real-time.
+    pub(crate) fn restore(&mut self, saved: &SavedForces, devices: usize, tick: u64) -> Result<(), Unsaved> {
+        let plugin = |model| PluginIndex::of_model(devices, model);
+        let Self { stacks, shared, couplings, .. } = self;
+        for (slot, saved) in stacks.iter_mut().flat_map(|stack| &mut stack.slots).zip(&saved.slots) {
+            slot.restore(saved, plugin(slot.number))?;
+        }
+        for (SharedSlot { slot, .. }, saved) in shared.iter_mut().zip(&saved.shared) {
+            slot.restore(saved, plugin(slot.number))?;
+        }
+        stacks
+            .iter_mut()
+            .flat_map(ModelStack::gains)
+            .zip(&saved.gains)
+            .for_each(|(gain, saved)| *gain = *saved);
+        for (coupled, saved) in couplings.iter_mut().zip(&saved.couplings) {
+            let Coupled::Here { coupling, pulls, .. } = coupled else { return Err(Unsaved::Remote) };
+            (*coupling, *pulls) = saved.clone();
+        }
+        // Before the states of the instances, which a parameter may change. A parameter that is not live follows a live one, or cannot
+        // have changed.
+        let now = Tick { index: tick, time_ns: 0, dt_ns: 0 };
+        for (model, parameter, value) in self.changed(saved) {
+            let _ = self.set_parameter(model, &now, parameter, value);
+        }
+        if let Some((model, ..)) = self.changed(saved).first() {
+            return Err(Unsaved::Plugin(plugin(*model)));
+        }
+        let mut instances = saved.instances.iter();
+        for (model, state) in self.states(tick) {
+            let bytes = instances.next().ok_or(Unsaved::OtherLoop)?;
+            let status = state.map(|mut state| state.restore(bytes));
+            (status == Some(CallStatus::Ok)).then_some(()).ok_or(Unsaved::Plugin(plugin(model)))?;
+        }
+        if instances.next().is_some() { Err(Unsaved::OtherLoop) } else { Ok(()) }
+    }
+
+    /// Returns the parameters with another value than the saved one: number of the model, index, saved value.
+    fn changed(&mut self, saved: &SavedForces) -> Vec<(usize, usize, f64)> {
+        let mut all = Vec::new();
+        let mut add = |model, changed: Vec<(usize, f64)>| {
+            all.extend(changed.into_iter().map(|(parameter, value)| (model, parameter, value)));
+        };
+        let slots = self.stacks.iter_mut().flat_map(|stack| &mut stack.slots);
+        slots.zip(&saved.slots).for_each(|(slot, saved)| add(slot.number, slot.changed(saved)));
+        let shared = self.shared.iter_mut().zip(&saved.shared);
+        shared.for_each(|(SharedSlot { slot, .. }, saved)| add(slot.number, slot.changed(saved)));
+        all
     }
 
     /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.

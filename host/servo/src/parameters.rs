@@ -7,16 +7,13 @@
 //! A number may be sent with a rate: the parameter then moves to the new value over many ticks, because a hand would feel a jump.
 //! Each step is a change with its own report, so a replay needs no rate.
 
-mod change;
-mod gradual;
-
-pub use change::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
+pub use flotor_core::parameter_change::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
 
 use super::queue::queue;
+use flotor_core::gradual::Movements;
 use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
-use gradual::Movements;
 use rtrb::{Consumer, Producer};
 
 /// Capacity for pending changes from other threads.
@@ -57,7 +54,25 @@ pub struct ParameterQueue {
     reports: Producer<ChangeReport>,
 }
 
+/// Saved state of the schedule and of gradual changes.
+pub(crate) struct SavedChanges {
+    next: usize,
+    movements: Movements,
+}
+
 impl ParameterQueue {
+    /// Saves schedule and gradual changes. Not real-time.
+    pub(crate) fn save(&self) -> SavedChanges {
+        SavedChanges { next: self.next, movements: self.movements.save() }
+    }
+
+    /// Restores schedule and gradual changes, and drops sent changes that are not applied yet. Not real-time.
+    pub(crate) fn restore(&mut self, saved: &SavedChanges) {
+        self.next = saved.next;
+        self.movements = saved.movements.save();
+        while self.sent.pop().is_ok() {}
+    }
+
     /// Creates a queue with a schedule; returns it with the sender of changes and the receiver of reports. Not real-time.
     ///
     /// `replacements`: number of model replacements for which to reserve reports, in addition to one for each scheduled change.

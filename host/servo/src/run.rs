@@ -1,6 +1,6 @@
 //! Loop of a run: ticks until the duration is over, a stop is requested, or a fault occurs.
 
-use crate::{Place, RunEnd, Schedule, Servo, StopSwitch};
+use crate::{Place, RunEnd, SavedLoop, Schedule, Servo, StopSwitch, Unsaved};
 use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 
@@ -66,6 +66,36 @@ impl Loop {
     #[must_use]
     pub fn end(&self) -> Option<RunEnd> {
         self.end
+    }
+
+    /// Saves the state before the next tick. Resets a path-dependent model that was inactive in the last tick, as before its next step.
+    /// Not real-time.
+    ///
+    /// # Errors
+    /// [`Unsaved`].
+    pub fn save(&mut self) -> Result<SavedLoop, Unsaved> {
+        self.check_saved()?;
+        let servo = self.servo.save(self.schedule.next_index())?;
+        Ok(SavedLoop { schedule: self.schedule, servo })
+    }
+
+    /// Restores a state that this loop has saved; later ticks have the same bits as after the state was saved. Not real-time.
+    ///
+    /// # Errors
+    /// [`Unsaved`]; unless it is [`Unsaved::RealClock`] or [`Unsaved::Ended`], the loop has to be dropped.
+    pub fn restore(&mut self, saved: &SavedLoop) -> Result<(), Unsaved> {
+        self.check_saved()?;
+        self.servo.restore(&saved.servo, saved.schedule.next_index())?;
+        (self.schedule, self.end) = (saved.schedule, None);
+        Ok(())
+    }
+
+    fn check_saved(&self) -> Result<(), Unsaved> {
+        match self.end {
+            _ if !self.schedule.is_virtual() => Err(Unsaved::RealClock),
+            None | Some(RunEnd::Finished) => Ok(()),
+            Some(_) => Err(Unsaved::Ended),
+        }
     }
 
     /// Returns the servo, with its devices and models.

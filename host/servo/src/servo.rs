@@ -7,6 +7,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
+use crate::saved::{SavedServo, Unsaved};
 use crate::stage_timer::{Moment, StageTimer};
 use crate::timing::STAGE_SAMPLING;
 use crate::{
@@ -166,6 +167,38 @@ impl Servo {
         if self.run != RunState::Holding {
             self.change_state(RunEvent::StopRequested, tick);
         }
+    }
+
+    /// Saves the state before tick `next`. Not real-time.
+    pub(crate) fn save(&mut self, next: u64) -> Result<SavedServo, Unsaved> {
+        let Self { stations, ports, parts: Parts { forces, parameters, .. }, run, .. } = self;
+        let devices = stations.len();
+        let station = |(device, station): (usize, &mut Station)| {
+            station.save().ok_or(Unsaved::Plugin(PluginIndex::at(device)))
+        };
+        Ok(SavedServo {
+            stations: stations.iter_mut().enumerate().map(station).collect::<Result<_, _>>()?,
+            forces: forces.save(devices, next)?,
+            ports: ports.clone(),
+            changes: parameters.save(),
+            run: *run,
+        })
+    }
+
+    /// Restores a state before tick `next`. Not real-time.
+    pub(crate) fn restore(&mut self, saved: &SavedServo, next: u64) -> Result<(), Unsaved> {
+        let Self { stations, ports, parts: Parts { forces, parameters, .. }, run, .. } = self;
+        if (stations.len(), ports.len()) != (saved.stations.len(), saved.ports.len()) {
+            return Err(Unsaved::OtherLoop);
+        }
+        forces.restore(&saved.forces, stations.len(), next)?;
+        for (device, (station, saved)) in stations.iter_mut().zip(&saved.stations).enumerate() {
+            station.restore(saved).ok_or(Unsaved::Plugin(PluginIndex::at(device)))?;
+        }
+        ports.copy_from_slice(&saved.ports);
+        parameters.restore(&saved.changes);
+        *run = saved.run;
+        Ok(())
     }
 
     /// Returns the time over which the force fades in and out, ns.

@@ -2,13 +2,14 @@
 
 use super::envelope::{Envelope, EnvelopeEffects};
 use super::port::Port;
-use super::state::{Cause, Gate, RunEvent};
 use flotor_core::demand::hand_demand;
 use flotor_core::grip::GripRecord;
 use flotor_core::plausibility::{
     Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
+use flotor_core::run_state::{Cause, Gate, RunEvent};
 use flotor_core::trace::Events;
+use flotor_hal::abi::CallStatus;
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Demand, Fault, Tick};
 use flotor_loader::ActiveDevice;
 
@@ -31,6 +32,16 @@ pub struct Station {
     fault: Option<Fault>,
     /// True if the device itself reported the fault.
     is_own_fault: bool,
+}
+
+/// Saved state of a station.
+pub(crate) struct SavedStation {
+    state: Vec<u8>,
+    parameters: Vec<f64>,
+    envelope: Envelope,
+    plausibility: PlausibilityCheck,
+    stale_ticks: u32,
+    untaken_ticks: u32,
 }
 
 /// Faults, implausible samples and envelope effects of a device in a run.
@@ -79,6 +90,38 @@ impl Station {
             fault: None,
             is_own_fault: true,
         }
+    }
+
+    /// Saves the state; `None` if the device has none to save, or has failed. Not real-time.
+    pub(super) fn save(&mut self) -> Option<SavedStation> {
+        let Self { device, envelope, plausibility, stale_ticks, untaken_ticks, fault, .. } = self;
+        Some(SavedStation {
+            state: fault.is_none().then(|| device.state())??.to_bytes()?,
+            parameters: device.parameters(),
+            envelope: envelope.clone(),
+            plausibility: plausibility.clone(),
+            stale_ticks: *stale_ticks,
+            untaken_ticks: *untaken_ticks,
+        })
+    }
+
+    /// Restores a state; `None` if the device refuses the state, or has failed. Not real-time.
+    pub(super) fn restore(&mut self, saved: &SavedStation) -> Option<()> {
+        let restored = self.fault.is_none().then(|| self.device.state())??.restore(&saved.state);
+        for (index, (now, saved)) in self.device.parameters().iter().zip(&saved.parameters).enumerate() {
+            if now.to_bits() != saved.to_bits() {
+                let _ = self.device.set_parameter(index, *saved);
+            }
+        }
+        let present = self.device.parameters();
+        let is_set = present
+            .iter()
+            .map(|value| value.to_bits())
+            .eq(saved.parameters.iter().map(|value| value.to_bits()));
+        self.envelope = saved.envelope.clone();
+        self.plausibility = saved.plausibility.clone();
+        (self.stale_ticks, self.untaken_ticks) = (saved.stale_ticks, saved.untaken_ticks);
+        (restored == CallStatus::Ok && is_set).then_some(())
     }
 
     /// Reads the newest sample into the port, with a normalised orientation, and returns the event for the run state. A stale or

@@ -1,7 +1,7 @@
 //! Stop switch: orderly end or emergency stop of a run, from any thread of the process.
 
 use super::platform::clock;
-use super::state::EmergencySource;
+use flotor_core::run_state::EmergencySource;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;

@@ -26,7 +26,7 @@ pub enum HeadlessError {
 /// at least the outputs in `demand`, and all outputs for a recording. Equal scenes and seeds give equal digests. Not real-time.
 ///
 /// # Errors
-/// [`HeadlessError`]. A device fault is no error: the summary reports it in `end`.
+/// [`HeadlessError`]. A device fault is not an error: the summary reports it in `end`.
 pub fn run(
     scene: &Scene,
     registry: &Registry,

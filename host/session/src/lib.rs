@@ -27,7 +27,6 @@ pub mod run_description;
 pub mod scene;
 mod session;
 pub mod summary;
-mod tally;
 pub mod telemetry;
 
 pub use calls::{
@@ -40,8 +39,8 @@ pub use measurements::{Measurements, RunRecording};
 pub use platform::ThreadClock;
 pub use plugin_process::PluginProcess;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, Lockstep,
-    NewValue, Observer, Outcome, PluginReport, RunError, RunOptions, Session, Steps, StopReach, StopTime,
-    StopWithoutHost, Strength, StrongDevice, Tap, UnfreedPlugins, WatchdogStart, check_plugins,
-    prepare_model, start_watchdog_process,
+    ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, LiveNumbers,
+    Lockstep, NewValue, Observer, Outcome, PluginReport, RunError, RunOptions, SavedRun, Session, Steps,
+    StopReach, StopTime, StopWithoutHost, Strength, StrongDevice, Tap, UnfreedPlugins, WatchdogStart,
+    check_plugins, prepare_model, start_watchdog_process,
 };

@@ -47,7 +47,7 @@ impl Observer for Measurements {
     }
 
     fn observe(&mut self, record: &TickRecord) {
-        self.tally.observe(record);
+        self.tally.add(record);
         self.digest.update(record);
         self.recording.observe(record);
     }

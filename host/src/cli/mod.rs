@@ -56,7 +56,7 @@ const LAB: SeparateProgram<'static> = built_with_this("flotor-lab");
 const STUDY: SeparateProgram<'static> = built_with_this("flotor-study");
 /// Program for the calibration of devices.
 const CALIBRATION: SeparateProgram<'static> = built_with_this("flotor-calibration");
-/// Program that identifies real things.
+/// Program that identifies real objects.
 const IDENTIFY: SeparateProgram<'static> = built_with_this("flotor-identify");
 /// Program that tests scenes with expectations.
 const TEST: SeparateProgram<'static> = built_with_this("flotor-test");
@@ -129,7 +129,7 @@ enum Command {
     Analyse(Separate),
     /// Measure the ratio of delivered to commanded vertical force, and correct it
     Calibrate(Separate),
-    /// Find the force law of a real thing from measured force and displacement
+    /// Find the force law of a real object from measured force and displacement
     Identify(Separate),
     /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),

@@ -1,7 +1,7 @@
 //! `flotor new`: creates the folder of a plugin, or the scene of a mesh file.
 
 use crate::cli::object::object_scene;
-use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, Template, scaffold};
+use crate::scaffold::{Built, Contract, Language, PluginName, Scaffold, ScaffoldError, Template, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
 use flotor_command::{CommandError, command_line, quoted, style};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Create a plugin: a folder that builds, passes `validate` and runs; or the scene of a mesh file.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n  flotor new model jelly --beside\n  flotor new model jelly --vendor\n  \
+    flotor new model jelly --language c\n  flotor new model jelly --beside\n  flotor new model jelly --beside --language python\n  flotor new model jelly --vendor\n  \
     flotor new scene duck --object duck.stl\n\nCreates the folder ./NAME with a plugin that builds, passes \
     `flotor validate` and runs in the scene of the same folder; of a scene, the file \
     ./NAME.toml.\nIt overwrites no file.")]
@@ -73,6 +73,10 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
             ));
         }
     };
+    if arguments.language == Language::Python && template != Template::AsynchronousModel {
+        let problem = "`--language python` is for models that are too slow for the loop: add `--beside`, or use rust or c";
+        return Err(CommandError::Usage(problem.to_owned()));
+    }
     refuse_an_id_in_use(&name)?;
     let sources = if arguments.vendor { Contract::copied } else { Contract::of_installation };
     let contract = sources(arguments.hal.as_deref())?;
@@ -112,14 +116,11 @@ fn report(name: &PluginName, made: &Scaffold) {
         say!("  {file}");
     }
     say!("\nNext:");
-    for command in [
-        &format!("cd {}", quoted(&made.folder.display().to_string())),
-        &made.build,
-        &command_line(["validate", made.library.as_str()]),
-        "flotor run scene.toml --plot run.svg",
-    ] {
-        say!("  {command}");
+    say!("  cd {}", quoted(&made.folder.display().to_string()));
+    if let Some(Built { command, library }) = &made.built {
+        say!("  {command}\n  {}", command_line(["validate", library.as_str()]));
     }
+    say!("  flotor run scene.toml --plot run.svg");
     if let Some(test) = made.files.iter().find(|file| file.ends_with(".test.toml")) {
         say!("  {}", command_line(["test", test.as_str()]));
     }

@@ -26,7 +26,7 @@ pub(crate) struct ObjectScene {
 /// Writes the scene around a mesh file. `sets`: settings of the command line, of which those of the surface count here.
 ///
 /// # Errors
-/// [`CommandError`] for a missing plugin, a setting of no parameter, or a file that is no mesh.
+/// [`CommandError`] for a missing plugin, a setting of no parameter, or a file that is not a mesh.
 pub(crate) fn object_scene(
     file: &Path,
     sets: &[PluginKeyValue],

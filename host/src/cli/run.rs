@@ -11,15 +11,15 @@ use flotor_command::options::{
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
-    CommandError, before_advice, first_error, keep_results_apart, note, print_result, progress_bar, style,
-    while_preparing, write_json,
+    CommandError, end_notes, end_words, first_error, keep_results_apart, note, print_result, progress_bar,
+    style, verdict, while_preparing, write_json,
 };
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_coupling::Line;
 use flotor_hal::Demand;
 use flotor_live::{Directory, EndKind};
-use flotor_record::{Note, Recorder, RunDescription, Severity};
+use flotor_record::{Recorder, RunDescription};
 use flotor_servo::{Clock, Core, EmergencySource, RunEnd};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
@@ -27,7 +27,7 @@ use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary};
 use flotor_session::telemetry::{LinkCounts, ObservedRun, PeerLink, publish, start_peer_link};
 use flotor_session::{
-    LatchGuard, Measurements, Observer, Outcome, PluginReport, RunError, RunOptions, Session, stop_waits_with,
+    LatchGuard, Measurements, Observer, Outcome, RunError, RunOptions, Session, stop_waits_with,
 };
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
@@ -211,7 +211,7 @@ fn report(
     let plugins = facts.plugins;
     let summary = RunSummary::new(facts, &outcome, &tally);
     // Before all other steps that can fail: the recording cannot be repeated.
-    let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
+    let recorded = recording.finish(&end_notes(&outcome, &summary)).map_err(Into::into);
     let drawn = match (&arguments.plot, plot) {
         (Some(path), Some(plot)) => std::fs::write(path, plot.into_svg(&summary.one_line(), &outcome.timing))
             .map_err(|cause| CommandError::file(path, "cannot write the plot", cause)),
@@ -221,6 +221,7 @@ fn report(
     let printed = print_result(arguments.json.file(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
+    always_degraded(&summary).into_iter().for_each(note);
     latch.and_then(|latch| stop_note(outcome.end, latch)).into_iter().for_each(note);
     let verdict = verdict(&outcome, plugins, &summary);
     // Last, because plugin code may hang or end the process.
@@ -231,25 +232,14 @@ fn report(
     first_error([verdict, freed, recorded, drawn, printed])
 }
 
-/// Returns notes for readers of the recording: reason of the end, failed plugins, missing ticks.
-fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
-    let note = |severity, source: &str, text: String| Note {
-        time_ns: outcome.elapsed_ns,
-        severity,
-        source: source.to_owned(),
-        text,
-    };
-    let mut notes = Vec::new();
-    if outcome.dropped_records > 0 {
-        let text = format!("{} ticks are missing: the recorder could not keep up", outcome.dropped_records);
-        notes.push(note(Severity::Warning, "flotor", text));
-    }
-    let ill = summary.plugins.iter().filter(|plugin| plugin.health != "ok");
-    notes.extend(ill.map(|plugin| note(Severity::Error, &plugin.name, plugin.health.clone())));
-    if !outcome.end.is_in_order() {
-        notes.push(note(Severity::Error, "flotor", end_words(outcome, summary.rate_hz)));
-    }
-    notes
+/// Returns advice if a model had no valid answer in any tick; `None` otherwise.
+fn always_degraded(summary: &RunSummary) -> Option<String> {
+    let degraded = summary.events.get("model_degraded").copied().unwrap_or(0);
+    (summary.ticks > 0 && degraded >= summary.ticks).then(|| {
+        "no tick had a valid answer of all models (`model_degraded`); move the handle or the model's origin into its domain, and give \
+         a model that computes asynchronously `[model.field]` with `rate_hz = 250` in the scene"
+            .to_owned()
+    })
 }
 
 /// Describes the effect of this run's emergency stop on other runs, or the source of the emergency stop of another run; `None`
@@ -258,20 +248,6 @@ fn stop_note(end: RunEnd, latch: &LatchGuard) -> Option<String> {
     match end {
         RunEnd::EmergencyStop(EmergencySource::Latch) => latch.check().err().map(|error| error.to_string()),
         _ => latch.reach().map(|reach| reach.to_string()),
-    }
-}
-
-/// Converts the end of the run to the result of the command.
-fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) -> Result<(), CommandError> {
-    match outcome.end {
-        RunEnd::DeviceFault(fault) => {
-            let (number, words) = outcome.faulted().unwrap_or_default();
-            let path = plugins.get(number).map(|device| device.metadata.path.clone()).unwrap_or_default();
-            let words = words.to_owned();
-            Err(CommandError::RunFault { path, fault, words })
-        }
-        end if end.is_in_order() => broken_plugins(outcome, summary),
-        end => Err(CommandError::run_ended(end, summary.rate_hz)),
     }
 }
 
@@ -337,34 +313,6 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
         }
     };
     lines.into_iter().map(link).collect()
-}
-
-/// Describes the end of a run for its clients.
-fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
-    match outcome.end {
-        RunEnd::DeviceFault(fault) => {
-            let words = outcome.faulted().map_or("", |(_, words)| words);
-            format!("device fault: {}{}", before_advice(words), fault.advice())
-        }
-        end => CommandError::run_ended(end, rate_hz).to_string(),
-    }
-}
-
-/// Returns an error for the first broken plugin, which sets the exit code: a model that failed, or a device that changed the
-/// floating-point environment.
-fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), CommandError> {
-    // Devices come first. A failed device has ended the run; tolerated faults of its samples are in the summary.
-    let is_borne =
-        |number: usize| outcome.devices.get(number).is_some_and(|device| device.float_changes == 0);
-    let mut plugins = summary.plugins.iter().enumerate();
-    let broken = plugins.find(|(number, plugin)| plugin.health != "ok" && !is_borne(*number));
-    broken.map_or(Ok(()), |(_, plugin)| {
-        let problem = format!(
-            "{}: `{}` {}; run `flotor validate` for details",
-            plugin.file, plugin.name, plugin.health
-        );
-        Err(CommandError::PluginRefused(problem))
-    })
 }
 
 /// Observers of a run: measurements, plot and progress line.

@@ -39,7 +39,7 @@ pub(crate) struct ViewArguments {
     /// Show the session of this process (default: the newest session)
     #[arg(long, value_name = "PID", conflicts_with = "file")]
     run: Option<u32>,
-    /// Write the traces of the recording as a table (.csv) or a plot (.svg, .png), which is light without --look dark
+    /// Write the traces of the recording as a table (.csv) or a plot (.svg, .png); a plot is light, or dark with --look dark
     #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
     /// Traces shown: force, torque, position, rotation, velocity, angular-velocity, energy, stiffness, lateness (default:

@@ -38,6 +38,8 @@ pub enum Language {
     Rust,
     /// One C file
     C,
+    /// One Python file, with `--beside`; it needs no build
+    Python,
 }
 
 /// Folder of a created plugin, with the paths of its files and the build command.
@@ -47,8 +49,15 @@ pub struct Scaffold {
     pub folder: PathBuf,
     /// Paths of the files, relative to the folder; the first file is the one to edit.
     pub files: Vec<String>,
+    /// Build of the plugin; `None` for a language without one.
+    pub built: Option<Built>,
+}
+
+/// Build of a plugin.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Built {
     /// Command that builds the plugin, to be run in the folder.
-    pub build: String,
+    pub command: String,
     /// Path of the built library, relative to the folder.
     pub library: String,
 }
@@ -87,8 +96,10 @@ pub fn scaffold(
     Ok(Scaffold {
         folder,
         files: written,
-        build: text.fill(BUILD),
-        library: text.fill(&format!("path/to/library/{DLL_PREFIX}your_name{DLL_SUFFIX}")),
+        built: (language != Language::Python).then(|| Built {
+            command: text.fill(BUILD),
+            library: text.fill(&format!("path/to/library/{DLL_PREFIX}your_name{DLL_SUFFIX}")),
+        }),
     })
 }
 
@@ -132,6 +143,13 @@ fn files(template: Template, language: Language) -> &'static [(&'static str, &'s
             const DEVICE: (&str, &str) = ("plugin.c", include_str!("templates/c/device.c"));
             &[DEVICE, DEVICE_SCENE, DEVICE_TEST, WORKFLOW, HEADER, IGNORE]
         }
+        // The command refuses any other template.
+        (_, Language::Python) => {
+            const MODEL: (&str, &str) = ("your_name.py", include_str!("templates/python/model.py"));
+            const SCENE: (&str, &str) = ("scene.toml", include_str!("templates/python/scene.toml"));
+            const TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/python/test.toml"));
+            &[MODEL, SCENE, TEST]
+        }
     }
 }
 
@@ -149,6 +167,7 @@ impl Placeholders {
         let (build, on_a_forge, built_in) = match language {
             Language::Rust => (cargo, format!("{cargo}{}", contract.option_on_a_forge()), "target/release"),
             Language::C => (C_COMPILER.unwrap_or(cc), cc.to_owned(), "."),
+            Language::Python => ("", String::new(), "."),
         };
         Self([
             (BUILD, build.to_owned()),
@@ -205,7 +224,7 @@ mod tests {
     #[test]
     fn no_placeholder_is_left() {
         let name = PluginName::new("soft-wall").unwrap();
-        for language in [Language::Rust, Language::C] {
+        for language in [Language::Rust, Language::C, Language::Python] {
             let text = Placeholders::new(&name, language, &Contract::Published);
             let templates = [Template::Model, Template::AsynchronousModel, Template::Device];
             for (path, source) in templates.into_iter().flat_map(|template| files(template, language)) {

@@ -84,7 +84,7 @@ impl<'a> Runs<'a> {
         match (status.signal(), status.code()) {
             (Some(signal), _) => format!("killed by {}", SignalName(signal)),
             (None, code) => {
-                format!("ended with exit code {} without an end of its run", code.unwrap_or_default())
+                format!("ended with exit code {} before the end of its run", code.unwrap_or_default())
             }
         }
     }

@@ -1,7 +1,8 @@
-"""Build backend of the wheel: maturin's, after building the plugin libraries and laying them beside the module.
+"""Build backend of the wheel: maturin's, after building plugins and command and laying them beside the module.
 
 A wheel that had to look for its plugins elsewhere would not work on a bare machine. Cargo builds the libraries
-anyway, because the host names their crates as dependencies; this finds them in Cargo's own report and copies them.
+anyway, because the host names their crates as dependencies; this finds them in Cargo's own report and copies them, and beside them the
+command, which finds plugins in its own folder.
 """
 
 import json
@@ -17,7 +18,7 @@ PLUGINS = PROJECT / "python" / "flotor" / "plugins"
 
 
 def _pack_plugins():
-    """Builds everything once; copies each shared library that is a plugin, by the name of its file."""
+    """Builds everything once; copies the command, and each shared library that is a plugin, by the name of its file."""
     report = subprocess.run(
         ["cargo", "build", "--release", "--message-format=json-render-diagnostics"],
         cwd=PROJECT,
@@ -29,7 +30,11 @@ def _pack_plugins():
     PLUGINS.mkdir(parents=True)
     for line in report.splitlines():
         artifact = json.loads(line)
-        if artifact.get("reason") != "compiler-artifact" or "cdylib" not in artifact["target"]["kind"]:
+        if artifact.get("reason") != "compiler-artifact":
+            continue
+        if artifact["target"]["name"] == "flotor-wheel":
+            shutil.copy(artifact["executable"], PLUGINS / "flotor")
+        if "cdylib" not in artifact["target"]["kind"]:
             continue
         for name in artifact["filenames"]:
             if name.endswith(".so") and not os.path.basename(name).startswith("lib_flotor"):

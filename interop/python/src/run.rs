@@ -1,12 +1,15 @@
-//! Runs of scenes in virtual time, and the list of plugins.
+//! Whole runs of scenes in virtual time, and the list of plugins.
 
-use crate::error::refuse;
-use flotor_core::LARGEST_SEED;
-use flotor_hal::Demand;
+use crate::ending::{Ended, Prepared};
+use crate::error::refuse_run;
+use crate::scene::GivenScene;
+use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
-use flotor_session::scene::{PluginKeyValue, Scene};
 use pyo3::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+
+/// Summary of a run as JSON text, and sentence and exit code if it did not end in order.
+pub(crate) type EndReport = (Option<String>, Option<(String, u8)>);
 
 /// Returns id, kind, version and file of every plugin found; opens none.
 #[pyfunction]
@@ -18,52 +21,20 @@ pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, Strin
         .collect()
 }
 
-/// Runs a scene (from its file or its text; the demo without both) in virtual time; returns the summary of `flotor run --json` as JSON text.
+/// Runs a scene in virtual time to its end, without the GIL.
 #[pyfunction]
-#[pyo3(signature = (scene, *, text, folders, duration_s, rate_hz, seed, settings, recording))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of Python
 pub(crate) fn run_scene(
     py: Python<'_>,
-    scene: Option<PathBuf>,
-    text: Option<String>,
-    folders: Vec<PathBuf>,
-    duration_s: Option<f64>,
-    rate_hz: Option<f64>,
-    seed: u64,
-    settings: Vec<String>,
+    given: GivenScene,
     recording: Option<PathBuf>,
-) -> PyResult<String> {
-    let mut scene = match (scene, text) {
-        (Some(path), _) => Scene::load(&path),
-        (None, Some(text)) => Scene::parse(Path::new("scene"), &text),
-        (None, None) => Scene::demo(),
-    }
-    .map_err(refuse)?;
-    if let Some(duration_s) = duration_s {
-        scene.duration_s = legal("duration_s", duration_s, 0.0, 31_536_000.0)?;
-    }
-    if let Some(rate_hz) = rate_hz {
-        let rate_hz = legal("rate_hz", rate_hz, 100.0, 10_000.0)?;
-        scene.set_rate(rate_hz, "rate_hz").map_err(refuse)?;
-    }
-    for setting in settings {
-        let setting: PluginKeyValue = setting.parse().map_err(refuse)?;
-        setting.apply(&mut scene).map_err(refuse)?;
-    }
-    let mut folders = folders;
-    folders.splice(0..0, scene.plugin_folders.iter().cloned());
-    let registry = Registry::search(&folders);
-    if seed > LARGEST_SEED {
-        return Err(refuse(format!("seed {seed} is larger than {LARGEST_SEED} (2^53); pass a smaller seed")));
-    }
-    let run = || flotor_session::headless::run(&scene, &registry, seed, recording.as_deref(), Demand::FORCE);
-    let summary = py.detach(run);
-    serde_json::to_string(&summary.map_err(refuse)?).map_err(refuse)
-}
-
-fn legal(name: &str, value: f64, min: f64, max: f64) -> PyResult<f64> {
-    if (min..=max).contains(&value) {
-        return Ok(value);
-    }
-    Err(refuse(format!("{name} = {value}: must be {min} to {max}")))
+) -> PyResult<EndReport> {
+    py.detach(|| {
+        let (scene, registry, seed) = given.read()?;
+        let prepared = Prepared::new(scene, &registry, (Clock::Virtual, seed), recording.as_deref());
+        let (prepared, session, mut measured) = prepared.map_err(refuse_run)?;
+        let notices = session.notices();
+        let ran = session.run(&mut measured, &StopSwitch::default());
+        let Ended { summary, problem } = prepared.conclude(measured, ran, notices);
+        Ok((summary, problem))
+    })
 }

@@ -112,4 +112,4 @@ def test_a_step_that_does_not_return_is_an_error_with_its_plugin_and_tick(tmp_pa
     program = [sys.executable, "-c", "import flotor, sys; flotor.run(sys.argv[1])", scene]
     ran = subprocess.run(program, capture_output=True, text=True, timeout=60)
     assert ran.returncode == 1, ran
-    assert "FlotorError: `jelly` did not return from `step` in tick 70 within 1 s of processor time" in ran.stderr
+    assert "RunFailed: `jelly` did not return from `step` in tick 70 within 1 s of processor time" in ran.stderr

@@ -99,7 +99,7 @@ pub enum Scale {
 #[non_exhaustive]
 pub enum PlanError {
     /// The file cannot be read.
-    #[error("{}: cannot read the plan: {cause}", path.display())]
+    #[error("{}: cannot read the plan: {cause}; check the path and its permissions", path.display())]
     Unreadable {
         /// Path of the plan.
         path: PathBuf,

@@ -1,21 +1,21 @@
-//! Means of successive samples, in which laws and measurement are compared.
+//! Cells: means of successive samples, on which laws and measurement are compared.
 //!
-//! An error of the law that hides in the noise of single samples shows in the means. The law is applied to each sample, and its force is
-//! averaged as the measured one: over a moving window and then over a cell. A corner of the motion or of the law has the same place on
-//! both sides, however wide the window, and the damping of a law takes less noise for motion.
+//! An error of the law smaller than the noise of single samples is visible in the means. The law is applied to each sample, and
+//! its force is averaged like the measured one: over a moving window and then over a cell. Averaging thus smooths corners of
+//! motion and law equally on both sides, and reduces the noise in the velocity of a damped law.
 
 use crate::law::{Motion, Response, Scales};
 use crate::measurement::{Measurement, mean, span};
 
-/// Largest number of samples in a cell.
+/// Maximum number of samples in a cell.
 const MOST_SAMPLES: usize = 64;
-/// Longest duration of a cell, s: short against the motions of a hand or a probe.
+/// Maximum duration of a cell, s: short compared with the motions of a hand or a probe.
 const LONGEST_S: f64 = 0.02;
-/// Fewest cells, if there are as many samples.
+/// Minimum number of cells, if there are as many samples.
 const LEAST_CELLS: usize = 240;
-/// Largest share of the displacement's span that a cell covers, exceeded by 2 % of the cells only.
+/// Maximum range of displacement in a cell, as a fraction of the span of the measurement; at most 2 % of the cells exceed it.
 const WIDEST: f64 = 0.08;
-/// Smallest noise, as a share of the largest force: differences of laws below it do not count.
+/// Lower limit of the noise, as a fraction of the force scale: smaller differences between laws are ignored.
 pub(crate) const LEAST_NOISE: f64 = 1.0e-4;
 
 /// Measurement divided into cells.
@@ -24,7 +24,7 @@ pub(crate) struct Cells<'a> {
     measurement: &'a Measurement,
     /// Times of the samples, s, or their indices.
     time_s: Vec<f64>,
-    /// Number of samples in each cell; the last ones, fewer, are left out.
+    /// Number of samples in each cell; the remaining samples at the end are not used.
     size: usize,
     scales: Scales,
     /// Displacement of each sample, averaged over about as many samples as a cell has, m.
@@ -33,14 +33,14 @@ pub(crate) struct Cells<'a> {
     pub(crate) force_n: Vec<f64>,
     /// Mean displacement of each cell, m.
     pub(crate) displacement_m: Vec<f64>,
-    /// Direction of the motion in each cell: 1 into the thing, -1 back, and between the two where it rests.
+    /// Direction of the motion in each cell: 1 into the object, -1 out of it, in between at rest.
     pub(crate) directions: Vec<f64>,
-    /// Standard deviation of the noise of a cell's mean force, N, from differences of neighbours; only a scale.
+    /// Standard deviation of the noise of a cell's mean force, N, estimated from differences of neighbours; used as a scale only.
     pub(crate) noise_n: f64,
 }
 
 impl<'a> Cells<'a> {
-    /// Divides a measurement. Not real-time.
+    /// Divides a measurement into cells. Not real-time.
     pub(crate) fn of(measurement: &'a Measurement) -> Self {
         let count = measurement.force_n().len();
         let most = (count / LEAST_CELLS).clamp(1, MOST_SAMPLES);
@@ -62,14 +62,14 @@ impl<'a> Cells<'a> {
         let means = |column: &[f64]| column.chunks_exact(size).map(mean).collect::<Vec<f64>>();
         let (force_n, displacement_m) = (means(&moving_mean(measurement.force_n(), size)), means(&smooth_m));
         let noise_n = noise(measurement.force_n()) / (size as f64).sqrt();
-        // A computed force has no noise, and a coarsely rounded one none in most samples.
+        // A computed force has no noise, and a coarsely quantised force has none in most samples.
         let scales = Scales::of(measurement);
         let noise_n = noise_n.max(LEAST_NOISE * scales.force_n);
         let directions = directions(&displacement_m, scales.span_m);
         Self { measurement, time_s, size, scales, smooth_m, force_n, displacement_m, directions, noise_n }
     }
 
-    /// Divides another measurement of as many samples in the same way; `None` if it has fewer.
+    /// Divides another measurement in the same way; `None` if the number of samples differs.
     pub(crate) fn of_same_size<'b>(&self, measurement: &'b Measurement) -> Option<Cells<'b>> {
         let is_same = measurement.force_n().len() == self.time_s.len();
         is_same.then(|| Cells { noise_n: self.noise_n, ..Cells::with_size(measurement, self.size) })
@@ -101,7 +101,7 @@ impl<'a> Cells<'a> {
         self.measurement
     }
 
-    /// Returns the mean time between samples, s; with indices for times one.
+    /// Returns the mean time between samples, s; 1 without times.
     pub(crate) fn period_s(&self) -> f64 {
         span(&self.time_s) / (self.time_s.len() - 1) as f64
     }
@@ -111,7 +111,7 @@ impl<'a> Cells<'a> {
         &self.time_s
     }
 
-    /// Returns the mean force of each cell, N, for a response whose force is measured so much later, s.
+    /// Returns the mean force of each cell, N, of a response measured with a delay, s.
     pub(crate) fn means(&self, response: &Response, delay_s: f64) -> Vec<f64> {
         let mut levels = Delayed::new(&self.time_s, &response.level_n);
         let level_n: Vec<f64> = self.time_s.iter().map(|time_s| levels.at(time_s - delay_s)).collect();
@@ -123,7 +123,8 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Returns the force of each sample, N, as [`Self::means`] does: the part with the velocity is the same within a cell.
+    /// Returns the force of each sample, N, of a response measured with a delay, s. The velocity-dependent part is constant
+    /// within a cell.
     pub(crate) fn samples(&self, response: &Response, delay_s: f64) -> Vec<f64> {
         let mut levels = Delayed::new(&self.time_s, &response.level_n);
         let rates = self.rates(response, delay_s).unwrap_or_default();
@@ -158,7 +159,7 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// Values at times between samples: cubic between two samples, with slopes of central differences; constant outside.
+/// Interpolated values at times between samples: cubic, with slopes of central differences; constant outside.
 struct Delayed<'a> {
     time_s: &'a [f64],
     values: &'a [f64],
@@ -194,7 +195,7 @@ impl<'a> Delayed<'a> {
     }
 }
 
-/// Returns the mean around each value over about so many values, an odd number, and over fewer at the ends.
+/// Returns the moving average over about `size` values, an odd number, fewer at the ends.
 pub(crate) fn moving_mean(values: &[f64], size: usize) -> Vec<f64> {
     let mut sum = 0.0;
     let sums: Vec<f64> = std::iter::once(0.0)
@@ -210,7 +211,7 @@ pub(crate) fn moving_mean(values: &[f64], size: usize) -> Vec<f64> {
     (0..values.len()).map(around).collect()
 }
 
-/// Returns the direction of the motion at each place, smooth where the motion is not above the noise of the places.
+/// Returns the direction of the motion at each position, -1 to 1, smoothed for motions within the noise of the positions.
 fn directions(places_m: &[f64], span_m: f64) -> Vec<f64> {
     let rest_m = (4.0 * noise(places_m)).max(1.0e-4 * span_m);
     let last = places_m.len() - 1;
@@ -218,7 +219,7 @@ fn directions(places_m: &[f64], span_m: f64) -> Vec<f64> {
     (0..=last).map(|at| flotor_hal::math::tanh(moved_m(at) / rest_m)).collect()
 }
 
-/// Returns true if cells of so many samples are short against the motion.
+/// Returns true if cells of `size` samples are short compared with the motion.
 fn is_short(measurement: &Measurement, size: usize) -> bool {
     let spans = |column: &[f64]| column.chunks_exact(size).map(span).collect::<Vec<f64>>();
     let widest = |mut spans: Vec<f64>| {
@@ -229,9 +230,9 @@ fn is_short(measurement: &Measurement, size: usize) -> bool {
     is_brief && widest(spans(measurement.displacement_m())) <= WIDEST * span(measurement.displacement_m())
 }
 
-/// Returns a robust estimate of the standard deviation of white noise: from second differences, which a slow change leaves small.
+/// Returns a robust estimate of the standard deviation of white noise, from second differences, to which slow changes add little.
 pub(crate) fn noise(values: &[f64]) -> f64 {
-    /// Median of the absolute value of a normal variable over its standard deviation, times the deviation of `a - 2 b + c`.
+    /// Median of the absolute value of a standard normal variable, times the standard deviation of `a - 2 b + c`.
     const PER_DEVIATION: f64 = 0.674_489_750_2 * 2.449_489_742_8;
     let mut sizes: Vec<f64> = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     let middle = sizes.len() / 2;

@@ -8,7 +8,7 @@ const FORCE: &str = "force_n";
 /// Columns of the displacement with their factors to m.
 const DISPLACEMENTS: [(&str, f64); 2] = [("displacement_m", 1.0), ("displacement_mm", 1.0e-3)];
 
-/// Measurement of a table, and the columns that were not read.
+/// Measurement of a table, and its ignored columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parsed {
     /// The samples.
@@ -17,8 +17,8 @@ pub struct Parsed {
     pub ignored: Vec<String>,
 }
 
-/// Parses a table with the columns `displacement_m` or `displacement_mm`, `force_n`, and if there is one `time_s`, in any order;
-/// displacement into the thing and force on the thing are positive. Other columns are not read. Not real-time.
+/// Parses a table with the columns `displacement_m` or `displacement_mm`, `force_n`, and optionally `time_s`, in any order;
+/// displacement into the object and force on the object are positive. Other columns are ignored. Not real-time.
 ///
 /// # Errors
 /// A [`TextProblem`] with the line: a missing column, a displacement in both units, a malformed row, a number that is not finite, or
@@ -102,7 +102,7 @@ mod tests {
             ),
             (
                 rows("time_s,displacement_mm,force_n", |i| format!("{},{i},{i}", if i == 5 { 0 } else { i })),
-                "f:7: the time falls",
+                "f:7: the time decreases",
             ),
             (rows("displacement_mm,force_n", |i| format!("1,{i}")), "f:31: the displacement is constant"),
             (rows("displacement_mm,force_n", |i| format!("{i},0")), "f:31: the force is zero everywhere"),

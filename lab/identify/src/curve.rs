@@ -4,12 +4,12 @@ use crate::identification::Identification;
 use crate::law::{Connection, Law, Motion, Scales};
 use crate::measurement::Measurement;
 
-/// Rows of the curve, the first without force.
+/// Number of rows of the curve; the first has no force.
 const ROWS: u32 = 65;
-/// Drawn length of a thing, as a multiple of its deepest compression.
+/// Drawn length of an object, as a multiple of its largest compression.
 const DRAWN: f64 = 1.5;
 
-/// Returns the force at rest over the depth, m and N, up to the deepest measured place; the force never falls. Not real-time.
+/// Returns the static force over the depth, m and N, up to the largest measured depth; the force never decreases. Not real-time.
 pub(crate) fn at_rest(identification: &Identification, measurement: &Measurement) -> Vec<(f64, f64)> {
     let scales = Scales::of(measurement);
     let deepest_m = scales.lowest_m + scales.span_m;
@@ -19,13 +19,13 @@ pub(crate) fn at_rest(identification: &Identification, measurement: &Measurement
         .parameters
         .iter()
         .filter(|estimate| law != Law::Table || estimate.id != "contact_m")
-        // Friction has both signs at rest; its mean is none.
+        // Friction has either sign at rest: use its mean, zero.
         .map(|estimate| if estimate.id == "friction_n" { 0.0 } else { estimate.value })
         .collect();
     let places: Vec<f64> = (0..ROWS)
         .map(|row| contact_m + (deepest_m - contact_m) * f64::from(row) / f64::from(ROWS - 1))
         .collect();
-    // So much time between the places that nothing is left of the motion.
+    // Time between the positions, long enough for every transient to decay.
     let times: Vec<f64> = (0..ROWS).map(|row| f64::from(row) * 1.0e9).collect();
     let motion = Motion { time_s: &times, displacement_m: &places, smooth_m: &places };
     let level_n = law.respond(&values, Connection::Presses, &scales, motion).level_n;
@@ -43,7 +43,7 @@ pub(crate) fn to_table(curve: &[(f64, f64)]) -> String {
     format!("compression_mm,force_n\n{rows}")
 }
 
-/// Returns a scene (TOML) with the curve, rendered by the simulated device in life size.
+/// Returns a scene (TOML) that renders the curve with the simulated device, at scale 1.
 pub(crate) fn scene(identification: &Identification, curve: &[(f64, f64)], table: &str) -> String {
     let deepest_m = curve.last().map_or(0.0, |(x_m, _)| *x_m);
     let law = identification.closest;

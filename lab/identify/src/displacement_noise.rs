@@ -1,9 +1,10 @@
 //! Correction of the bias from noise of the displacement.
 //!
-//! Noise of the displacement reduces the estimated dependence of the force on the velocity, and works a dry friction to and fro, however
-//! many samples there are. The correction is that of a parametric bootstrap (Efron and Tibshirani 1993, section 10.6): for a smooth motion
-//! like the measured one, the fitted law gives the force; the motion with as much noise as the measured one has is fitted to this force,
-//! and the step from the known coordinates is the bias. Pairs of opposite noise remove what is linear in it.
+//! Noise of the displacement reduces the estimated dependence of the force on the velocity and repeatedly reverses a dry
+//! friction, regardless of the number of samples. The correction is that of a parametric bootstrap (Efron and Tibshirani 1993,
+//! section 10.6): the fitted law gives the force for a smooth motion similar to the measured one; the law is fitted to this force
+//! and the motion with equally strong noise, and the step from the known coordinates is the bias. Pairs of opposite noise cancel
+//! its linear effect.
 
 use crate::cells::{Cells, moving_mean};
 use crate::fit::{Device, Fit, Problem};
@@ -13,14 +14,14 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 
-/// Pairs of opposite noise.
+/// Number of pairs of opposite noise.
 const PAIRS: u64 = 2;
-/// Cells over which the motion like the measured one is averaged.
+/// Window of the moving average for the smooth motion, in cells.
 const LIKENESS: usize = 4;
-/// Noise of this mean that is no motion, in standard deviations.
+/// Half-width of the dead band for the noise of this average, in standard deviations.
 const PLAY: f64 = 2.0;
 
-/// Returns the coordinates of a fit without the bias from noise of the displacement.
+/// Returns the coordinates of a fit, corrected for the bias from noise of the displacement.
 pub(crate) fn corrected(fit: &Fit, cells: &Cells<'_>, device: Device) -> Option<DVector<f64>> {
     let (measurement, scales) = (cells.measurement(), cells.scales());
     let deviation_m = noise_of_displacement(measurement.displacement_m());
@@ -44,8 +45,8 @@ pub(crate) fn corrected(fit: &Fit, cells: &Cells<'_>, device: Device) -> Option<
     Some(&fit.coordinates + rest - bias)
 }
 
-/// Returns a motion like the measured one without its noise: means over so many samples, which move only by more than most of their noise. A place
-/// where the probe rests has one displacement; else a dry friction would be worked to and fro here, too.
+/// Returns the measured motion without most of its noise: a moving average over `size` samples with a dead band, so that noise at
+/// rest does not reverse a dry friction.
 fn likeness(displacement_m: &[f64], size: usize, deviation_m: f64) -> Vec<f64> {
     let means_m = moving_mean(displacement_m, size);
     let play_m = PLAY * deviation_m / (size as f64).sqrt();
@@ -57,10 +58,10 @@ fn likeness(displacement_m: &[f64], size: usize, deviation_m: f64) -> Vec<f64> {
     means_m.into_iter().map(follow).collect()
 }
 
-/// Estimates the standard deviation of the displacement's noise: from third, fourth and fifth differences, the smallest, because a fast
-/// motion adds to low orders, and rare corners to none (the median).
+/// Estimates the standard deviation of the displacement's noise: the smallest estimate from third, fourth and fifth differences,
+/// because fast motion adds to low orders. The median excludes rare corners.
 fn noise_of_displacement(displacement_m: &[f64]) -> f64 {
-    /// Median of the absolute value of a normal variable over its standard deviation.
+    /// Median of the absolute value of a standard normal variable.
     const MEDIAN: f64 = 0.674_489_750_2;
     let difference = |values: &[f64]| values.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>();
     let mut differences = difference(&difference(displacement_m));

@@ -1,7 +1,8 @@
 //! Least-squares fit of one law: Levenberg and Marquardt's method (crate `levenberg-marquardt`, after MINPACK's `lmder`).
 //!
-//! The unknowns are the law's parameters and properties of the device: the delay of the force against the displacement, and the
-//! error of the force over the displacement. These have priors; the errors of the law's parameters thus contain theirs.
+//! The unknowns are the parameters of the law and two properties of the device: the delay of the force relative to the
+//! displacement, and the error of the force as a function of displacement. The device's properties have priors, so the
+//! uncertainty of the law's parameters includes that of the device.
 
 use crate::cells::Cells;
 use crate::law::{Connection, Form, Law, Response, Scales};
@@ -14,25 +15,25 @@ use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 const DELAY_UNIT_S: f64 = 1.0e-3;
 /// Standard deviation of the prior of the delay, ms.
 const DELAY_DEVIATION: f64 = 2.0;
-/// Polynomials of the force error over the displacement.
+/// Number of polynomials for the force error over the displacement.
 const FORCE_ERRORS: usize = 3;
 /// Step of the central differences of the Jacobian, in coordinates of the order of one.
 const STEP: f64 = 1.0e-5;
-/// Largest number of samples of the first search.
+/// Maximum number of samples in the first search.
 const COARSE_SAMPLES: usize = 800;
-/// Evaluations of the method for each unknown.
+/// Maximum number of evaluations per unknown.
 const PATIENCE: usize = 8;
-/// Relative decrease of the sum of squares, and relative step, at which the first search and the final fit end. One standard deviation
-/// of a parameter changes the sum by one, of as many as there are cells.
+/// Relative decrease of the sum of squares, and relative step, at which the first search and the final fit end. A change of a
+/// parameter by one standard deviation changes the sum, about the number of cells, by one.
 const ROUGH: f64 = 1.0e-5;
 const FINE: f64 = 1.0e-9;
 
-/// Known properties of the device that measured.
+/// Known properties of the measuring device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Device {
     /// Standard deviation of the relative error of the measured force, which changes slowly over the displacement.
     pub force_error: f64,
-    /// Standard deviation of the device's own dry friction, which adds to the measured force against the motion, N.
+    /// Standard deviation of the device's own dry friction, which opposes the motion and adds to the measured force, N.
     pub friction_n: f64,
 }
 
@@ -44,7 +45,7 @@ pub(crate) struct Fit {
     pub(crate) coordinates: DVector<f64>,
     /// Residual of each cell, N: measured minus predicted.
     pub(crate) residuals_n: Vec<f64>,
-    /// Change of each cell's prediction by each coordinate, N.
+    /// Derivative of each cell's prediction with respect to each coordinate, N.
     pub(crate) jacobian_n: DMatrix<f64>,
     /// Precision of the prior of each coordinate; zero without prior.
     pub(crate) precisions: DVector<f64>,
@@ -69,7 +70,7 @@ impl Fit {
     }
 }
 
-/// Returns the delay of a coordinate, s.
+/// Converts a coordinate to a delay, s.
 pub(crate) fn delay_s(coordinate: f64) -> f64 {
     DELAY_UNIT_S * coordinate
 }
@@ -109,8 +110,8 @@ pub(crate) fn fit(law: Law, connection: Connection, cells: &Cells<'_>, device: D
     })
 }
 
-/// Returns possible coordinates of the contact: where the force rises above its noise, the start of the displacement, and the foot of
-/// a straight line through the upper half of the force.
+/// Returns initial guesses for the coordinate of the contact: where the force exceeds its noise, at the smallest displacement,
+/// and at the zero of a straight line through the upper half of the forces.
 fn contacts(cells: &Cells<'_>, scales: &Scales) -> Vec<f64> {
     let threshold_n = (6.0 * cells.noise_n).max(0.02 * scales.force_n);
     let pairs = || cells.displacement_m.iter().zip(&cells.force_n);
@@ -134,7 +135,7 @@ fn contacts(cells: &Cells<'_>, scales: &Scales) -> Vec<f64> {
     contacts
 }
 
-/// Adds the coordinates of the device to a start, and scales its amplitude to the measured force.
+/// Adds the coordinates of the device to an initial guess, and scales its amplitude to the measured force.
 fn with_amplitude(
     law: Law,
     connection: Connection,
@@ -186,12 +187,12 @@ impl<'a> Problem<'a> {
         Self { law: *law, connection: *connection, cells, device, scales, coordinates: coordinates.clone() }
     }
 
-    /// Returns the step of Gauss and Newton from the coordinates; `None` if they are not determined.
+    /// Returns the Gauss-Newton step from the coordinates; `None` if the measurement does not determine them.
     pub(crate) fn step(&self) -> Option<DVector<f64>> {
         self.step_along(&self.residuals()?)
     }
 
-    /// Returns the same step without the pull of the priors.
+    /// Returns the Gauss-Newton step of the data alone, without the gradient of the priors.
     pub(crate) fn step_of_data(&self) -> Option<DVector<f64>> {
         let mut residuals = self.residuals()?;
         residuals.iter_mut().skip(self.cells.count()).for_each(|of_prior| *of_prior = 0.0);

@@ -1,4 +1,4 @@
-//! From a measurement to a law with its parameters.
+//! Identification of a law and its parameters from a measurement.
 
 use crate::cells::{Cells, LEAST_NOISE};
 use crate::displacement_noise::corrected;
@@ -8,14 +8,14 @@ use crate::law::{Connection, Coordinate, Law, Scales, knot_displacement_m};
 use crate::measurement::{Measurement, mean};
 use crate::uncertainty::{Structure, half_widths, structure};
 
-/// Structure of the residuals up to which a law counts as the right one, as a share of the root mean square of the force.
+/// Maximum structure of the residuals of an accepted law, as a fraction of the root mean square of the force.
 const TOLERANCE: f64 = 0.005;
-/// Structure of the residuals that noise does not reach, in standard deviations.
+/// Structure of the residuals above which it is significant, in standard deviations.
 const SIGNIFICANT: f64 = 4.5;
 
-/// Largest half width of the interval of a positive parameter of a law that is chosen, as a natural logarithm of a ratio.
+/// Maximum half-width of the interval of a positive parameter for an eligible law, as the natural logarithm of a ratio.
 const WIDEST_RATIO: f64 = 1.5;
-/// Shortest time of a law that is chosen, in periods of the samples.
+/// Minimum time constant of an eligible law, in sampling periods.
 const SHORTEST_PERIODS: f64 = 2.0;
 
 /// Number with its 95 % interval.
@@ -31,12 +31,12 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Law of the ladder with its error of prediction.
+/// Law of the ladder with its prediction error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rung {
     /// The law.
     pub law: Law,
-    /// Root mean square of the error of prediction by cross-validation, N, of means of successive samples.
+    /// Root mean square of the prediction error of cells in cross-validation, N.
     pub score_n: f64,
     /// Standard error of the score, N.
     pub standard_error_n: f64,
@@ -45,17 +45,17 @@ pub struct Rung {
 /// Result of an identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identification {
-    /// Law that explains the measurement; `None`: none of the ladder.
+    /// Law that explains the measurement; `None` if no law of the ladder does.
     pub law: Option<Law>,
     /// Law that was chosen by cross-validation: `law`, or the closest one if none explains the measurement.
     pub closest: Law,
     /// Parameters of the closest law.
     pub parameters: Vec<Estimate>,
-    /// Delay of the force against the displacement, s; `None` without times.
+    /// Delay of the force relative to the displacement, s; `None` without times.
     pub delay_s: Option<Estimate>,
     /// Root mean square of the difference between measured and predicted force of each sample, N.
     pub rms_n: f64,
-    /// Root mean square of the part of this difference that noise does not have, N.
+    /// Root mean square of the part of this difference that is not noise, N.
     pub structure_n: f64,
     /// Scores of the laws, in the order of [`Law::ALL`].
     pub ladder: Vec<Rung>,
@@ -84,7 +84,7 @@ impl Identification {
     }
 }
 
-/// Reason for which no law can be fitted.
+/// Reason why no law can be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum IdentifyError {
     /// A law with a rate needs times.
@@ -156,8 +156,8 @@ pub fn identify(
     })
 }
 
-/// Returns true if the measurement determines each parameter: a law with parameters that could be anything is a simpler one, or the limit of
-/// one that is not in the ladder.
+/// Returns true if the measurement determines each parameter. A law with an undetermined parameter is equivalent to a simpler
+/// one, or to a limiting case outside the ladder.
 fn is_determined(fit: &Fit, cells: &Cells<'_>) -> bool {
     let Some(widths) = half_widths(fit, cells.noise_n) else { return false };
     let period_s = cells.period_s();
@@ -179,7 +179,7 @@ fn explains(structure: Structure, cells: &Cells<'_>) -> bool {
     structure.deviations < SIGNIFICANT || structure.rms_n < TOLERANCE * mean(&squares).sqrt()
 }
 
-/// Fits a law, for a thing that is also pulled with both connections, and returns the better fit.
+/// Fits a law; with both kinds of connection if the object is also pulled, and returns the better fit.
 fn connected(law: Law, cells: &Cells<'_>, device: Device) -> Option<Fit> {
     let scale_n = cells.force_n.iter().map(|force_n| force_n.abs()).fold(0.0, f64::max);
     let pull_n = (8.0 * cells.noise_n).max(0.01 * scale_n);
@@ -211,7 +211,7 @@ fn estimates(fit: &Fit, cells: &Cells<'_>) -> Option<(Vec<Estimate>, Option<Esti
     Some((parameters, delay.map(|around| estimate("delay_s", around.map(delay_s)))))
 }
 
-/// Returns the displacement at which the force of a table begins, within the distance of two knots.
+/// Returns the displacement at which the force of a table begins, with an interval of one knot spacing.
 fn table_contact(knots: &[Estimate], scales: &Scales) -> Option<Estimate> {
     let deepest_n = knots.iter().map(|knot| knot.value).fold(0.0, f64::max);
     let pressed = knots.iter().position(|knot| knot.low > 0.0 && knot.value > 0.01 * deepest_n)?;

@@ -1,6 +1,6 @@
 //! Choice of a law by cross-validation.
 //!
-//! The measurement is divided into segments, which are left out in turns and predicted from the rest. A fold is left out by one
+//! The measurement is divided into segments, each left out in turn and predicted from the rest. The fit without a fold is one
 //! Gauss-Newton step from the fit of all cells, which is exact for a law linear in its parameters.
 
 use crate::fit::Fit;
@@ -10,12 +10,12 @@ use nalgebra::{DMatrix, DVector};
 
 /// Number of folds.
 const FOLDS: usize = 8;
-/// Largest number of segments.
+/// Maximum number of segments.
 const MOST_SEGMENTS: usize = 64;
-/// Fewest cells in a segment, if there are enough for one segment a fold.
+/// Minimum number of cells in a segment, if there are enough for one segment per fold.
 const LEAST_CELLS: usize = 6;
 
-/// Error of prediction of a law in cells that were left out of its fit.
+/// Prediction error of a law in cells left out of its fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Score {
     /// Mean of the squared errors, N².
@@ -53,8 +53,9 @@ pub(crate) fn score(fit: &Fit, noise_n: f64) -> Option<Score> {
     mean_square.is_finite().then_some(Score { mean_square, standard_error })
 }
 
-/// Returns the index of the law to choose: of those whose score is within one standard error of the best one (Breiman et al. 1984),
-/// one with the fewest parameters, and of these the one with the best score. Errors below `least_n` are equal.
+/// Returns the index of the chosen law (one-standard-error rule, Breiman et al. 1984): among the laws within one standard error
+/// of the best score, the law with the fewest parameters, and among these the one with the best score. Errors below `least_n`
+/// count as equal.
 pub(crate) fn choice(candidates: &[(usize, Score)], least_n: f64) -> Option<usize> {
     let (_, best) =
         candidates.iter().min_by(|(_, one), (_, other)| one.mean_square.total_cmp(&other.mean_square))?;

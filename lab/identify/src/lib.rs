@@ -1,12 +1,12 @@
-//! Identification of a real thing: from force over displacement to a law with the errors of its parameters.
+//! Identification of the force law of a real object from measured force and displacement, with the uncertainty of its parameters.
 //!
-//! The laws form a ladder, from a constant stiffness to a curve of many points. Each is fitted by least squares and scored by its error
-//! of prediction in parts of the measurement that were left out; the simplest law within one standard error of the best one is chosen,
-//! and `none of these` is the answer if its residuals have structure that noise does not have.
+//! The laws form a ladder, from a constant stiffness to a curve of many points. Each is fitted by least squares and scored by
+//! cross-validation, its prediction error in parts of the measurement left out of the fit; the simplest law within one standard
+//! error of the best one is chosen, and the result is `none of these` if its residuals are not noise alone.
 //!
-//! Data flows one way: [`csv`] or [`recording`] -> [`Measurement`] -> `cells` (means of some samples) -> `law` (predicted force) ->
-//! `fit` (least squares) -> `ladder` (scores and choice) -> `uncertainty` and `displacement_noise` (intervals without bias) ->
-//! [`Identification`] -> [`picture`], `curve` (a scene that renders the thing).
+//! Data flows one way: [`csv`] or [`recording`] -> [`Measurement`] -> `cells` (means of successive samples) -> `law` (predicted
+//! force) -> `fit` (least squares) -> `ladder` (scores and choice) -> `uncertainty` and `displacement_noise` (intervals without
+//! bias) -> [`Identification`] -> [`picture`], `curve` (a scene that renders the object).
 //!
 //! Not real-time throughout.
 

@@ -1,4 +1,4 @@
-//! Symmetric positive definite systems whose unknowns have units of their own.
+//! Symmetric positive definite systems with unknowns of different units.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

@@ -1,10 +1,10 @@
 //! Measured force over displacement.
 
-/// Fewest samples of a measurement: the most flexible law but the table has five parameters and a delay.
+/// Minimum number of samples of a measurement: the most flexible law, except the table, has five parameters and a delay.
 pub const LEAST_SAMPLES: usize = 20;
 
-/// Samples of one thing under test, in the order of their measurement: displacement into the thing and force on the thing, both
-/// positive in compression.
+/// Samples of one object under test, in the order of their measurement: displacement into the object and force on the object,
+/// both positive in compression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measurement {
     time_s: Option<Vec<f64>>,
@@ -25,23 +25,23 @@ pub enum MeasurementError {
     #[error("sample {0} is not finite; remove it")]
     NotFinite(usize),
     /// Index of a sample whose time is before that of its predecessor.
-    #[error("the time falls at sample {0}; sort the samples by time, or remove the column `time_s`")]
+    #[error("the time decreases at sample {0}; sort the samples by time, or remove the column `time_s`")]
     TimeFalls(usize),
-    /// All samples have the same displacement.
-    #[error("the displacement is constant; press the thing, and measure again")]
+    /// Equal displacements of all samples.
+    #[error("the displacement is constant; press the object, and measure again")]
     Constant,
-    /// No sample has a force.
+    /// Zero force in all samples.
     #[error("the force is zero everywhere; press until the force rises, and measure again")]
     NoForce,
 }
 
 impl MeasurementError {
-    /// Returns the message without the number of the sample, for a message with the line of a file.
+    /// Returns the message without the sample number, for messages that have a line number.
     #[must_use]
     pub fn without_sample(&self) -> String {
         match self {
             Self::TimeFalls(_) => {
-                "the time falls; sort the rows by time, or remove the column `time_s`".to_owned()
+                "the time decreases; sort the rows by time, or remove the column `time_s`".to_owned()
             }
             Self::NotFinite(_) => "a number is not finite; remove the row".to_owned(),
             other => other.to_string(),
@@ -53,7 +53,7 @@ impl Measurement {
     /// Creates a measurement from its columns; without `time_s` only laws without rate are identified. Not real-time.
     ///
     /// # Errors
-    /// A [`MeasurementError`] for too few samples, columns of different lengths, numbers that are not finite, a falling time, a
+    /// A [`MeasurementError`] for too few samples, columns of different lengths, numbers that are not finite, a decreasing time, a
     /// constant displacement, or a force that is zero everywhere.
     pub fn new(
         time_s: Option<Vec<f64>>,
@@ -83,7 +83,7 @@ impl Measurement {
         if force_n.iter().all(|force_n| *force_n == 0.0) {
             return Err(MeasurementError::NoForce);
         }
-        // Times that are all equal say as little as none.
+        // Treat equal times as missing.
         let time_s = time_s.filter(|time_s| span(time_s) > 0.0);
         Ok(Self { time_s, displacement_m, force_n })
     }
@@ -94,19 +94,19 @@ impl Measurement {
         self.time_s.as_deref()
     }
 
-    /// Returns the displacements into the thing, m.
+    /// Returns the displacements into the object, m.
     #[must_use]
     pub fn displacement_m(&self) -> &[f64] {
         &self.displacement_m
     }
 
-    /// Returns the forces on the thing, N.
+    /// Returns the forces on the object, N.
     #[must_use]
     pub fn force_n(&self) -> &[f64] {
         &self.force_n
     }
 
-    /// Returns the measurement with a length added to each displacement, m. Not real-time.
+    /// Returns the measurement with a length `by_m` added to each displacement. Not real-time.
     pub(crate) fn displaced(&self, by_m: impl Iterator<Item = f64>) -> Self {
         let displacement_m = self.displacement_m.iter().zip(by_m).map(|(x, by_m)| x + by_m).collect();
         Self { displacement_m, ..self.clone() }

@@ -1,13 +1,13 @@
-//! Picture of an identification: fit, residuals, and the difference that a hand would feel.
+//! Picture of an identification: fit, residuals, and the perceptible difference.
 
 use crate::identification::Identification;
 use crate::measurement::{Measurement, mean};
 use flotor_plot::{Axis, Figure, Panel, Quantity, Series};
 
 const MM_PER_M: f64 = 1.0e3;
-/// Smallest difference of a force that people notice, as a share of the force (Pang, Tan and Durlach 1991: 5 to 10 %).
+/// Just noticeable difference of a force, as a fraction of the force (Pang, Tan and Durlach 1991: 5 to 10 %).
 const FORCE_JND: f64 = 0.07;
-/// Number of means that the difference is drawn of: noise of single samples is not felt.
+/// Number of means in the drawing of the difference: noise of single samples is not perceptible.
 const MEANS: usize = 400;
 
 /// Draws an identification as SVG. Not real-time.
@@ -15,7 +15,7 @@ const MEANS: usize = 400;
 pub fn to_svg(measurement: &Measurement, identification: &Identification) -> String {
     let x_mm: Vec<f64> = measurement.displacement_m().iter().map(|x| x * MM_PER_M).collect();
     let pairs = |values: &[f64]| x_mm.iter().copied().zip(values.iter().copied()).collect::<Vec<_>>();
-    let fit = Panel::new(Axis::of("Force on the thing", Quantity::Force))
+    let fit = Panel::new(Axis::of("Force on the object", Quantity::Force))
         .series(Series::line("measured", pairs(measurement.force_n())))
         .series(Series::line(identification.closest.id(), pairs(&identification.prediction_n)));
     let residuals = identification.residuals_n(measurement);
@@ -26,7 +26,7 @@ pub fn to_svg(measurement: &Measurement, identification: &Identification) -> Str
         Axis::of("Displacement", Quantity::Length),
     )
     .subtitle(format!(
-        "{} samples; residual {:.4} N, of which {:.4} N are no noise",
+        "{} samples; residual {:.4} N, of which {:.4} N is not noise",
         x_mm.len(),
         identification.rms_n,
         identification.structure_n
@@ -38,7 +38,7 @@ pub fn to_svg(measurement: &Measurement, identification: &Identification) -> Str
     .to_svg()
 }
 
-/// Draws means of the residuals between the limits of what people notice.
+/// Draws means of the residuals between the limits of the just noticeable difference.
 fn felt(measurement: &Measurement, identification: &Identification, residuals_n: &[f64]) -> Panel {
     let size = residuals_n.len().div_ceil(MEANS).max(1);
     let means = |values: &[f64]| values.chunks(size).map(mean).collect::<Vec<f64>>();

@@ -1,13 +1,13 @@
-//! Measurement from a recording: the motion along one axis, and the force that the device or a force sensor reports.
+//! Measurement from a recording: the motion along one axis, and the force reported by the device or by a force sensor.
 //!
-//! The direction into the thing is that in which the force grows, and the force on the thing is positive there: a model that the hand
-//! feels and a real thing under the handle give the same measurement.
+//! The direction into the object is the direction in which the force grows, with a positive force on the object: a rendered model
+//! and a real object under the handle thus give the same measurement.
 
 use crate::measurement::{Measurement, MeasurementError, mean};
 use flotor_record::{ReadError, Recording, Role, RunDescription};
 use std::path::Path;
 
-/// Id of the plugin of a force sensor; its force replaces that of the device.
+/// Plugin id of the force sensor; its force replaces that of the device.
 const FORCE_SENSOR: &str = "force-sensor";
 
 /// Axis of a recording's motion, in the device frame.
@@ -22,13 +22,13 @@ pub enum Axis {
     Z,
 }
 
-/// Failure to make a measurement of a recording.
+/// Error of reading a measurement from a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The samples are no measurement.
+    /// Invalid samples.
     #[error("`{file}`: {cause}")]
     Samples {
         /// Path of the recording.
@@ -58,7 +58,7 @@ pub fn read(path: &Path, axis: Axis) -> Result<Measurement, RecordingError> {
             }
         }
         if Some(record.device) == sensor {
-            // A sensor reports the force along its own axis as z.
+            // The sensor reports the force along its axis as z.
             force_n.push(record.delivered.force_n[2]);
         }
     }
@@ -71,13 +71,13 @@ pub fn read(path: &Path, axis: Axis) -> Result<Measurement, RecordingError> {
         .map_err(|cause| RecordingError::Samples { file: path.display().to_string(), cause })
 }
 
-/// Returns the index of the device that is a force sensor.
+/// Returns the index of the force sensor among the devices.
 fn force_sensor(run: &RunDescription) -> Option<u16> {
     let devices = run.plugins.iter().filter(|plugin| plugin.role == Role::Device);
     devices.filter(|plugin| plugin.id == FORCE_SENSOR).map(|plugin| plugin.device).next()
 }
 
-/// Returns the signs that make displacements into the thing, and forces on it, positive.
+/// Returns the signs that make displacements into the object, and forces on the object, positive.
 fn directions(position_m: &[f64], force_n: &[f64]) -> (f64, f64) {
     let covariance = |forces: &[f64]| {
         let (x_mean, f_mean) = (mean(position_m), mean(forces));

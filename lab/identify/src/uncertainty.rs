@@ -1,12 +1,13 @@
-//! Errors of fitted parameters, and structure of residuals.
+//! Uncertainty of fitted parameters, and structure of residuals.
 //!
-//! The residuals of successive cells are correlated: the cells are means over overlapping windows, and the noise of the device may be
-//! filtered. Their size differs, too: noise of the displacement counts where the thing is stiff. The variance of a coordinate is thus
-//! that of the sum of its influences, the rows of `A⁻¹ Jᵀ r` with the normal matrix `A`, as a correlated series: its first-order
-//! autoregression is removed, the rest is summed over neighbours with falling weights (Newey and West 1987), as many as the
-//! autocorrelation of the rest asks for (Andrews 1991), and the autoregression is put back (Andrews and Monahan 1992). Without the first
-//! step the weights lose a part of the correlation, and the intervals are too narrow. Each residual is divided by one less its leverage,
-//! as in a jackknife (MacKinnon and White 1985): a contact is determined by few cells, which the fit follows.
+//! The residuals of successive cells are correlated: the cells are means over overlapping windows, and the noise of the device
+//! may be filtered. Their variance differs as well: noise of the displacement has more effect where the object is stiff. The
+//! variance of a coordinate is thus that of the sum of its influences, the rows of `A⁻¹ Jᵀ r` with the normal matrix `A`, as a
+//! correlated series: its first-order autoregression is removed (prewhitening, Andrews and Monahan 1992), the autocovariances of
+//! the rest are summed with decreasing weights (Newey and West 1987) up to a lag that follows from the autocorrelation (Andrews
+//! 1991), and the autoregression is restored. Without prewhitening the sum misses a part of the correlation, and the intervals
+//! are too narrow. Each residual is divided by one less its leverage, as in a jackknife (MacKinnon and White 1985): few cells
+//! determine the contact, and the fit follows these cells.
 
 use crate::fit::Fit;
 use crate::linear_system::invert;
@@ -14,10 +15,10 @@ use nalgebra::DMatrix;
 
 /// Quantile of the normal distribution for a two-sided interval of 95 %.
 const QUANTILE_95: f64 = 1.959_963_985;
-/// Largest autocorrelation of influences that is put back: above it the sum is that of a random walk.
+/// Upper limit of the restored autocorrelation of influences: above, the series is close to a random walk.
 const MOST_CORRELATION: f64 = 0.97;
 
-/// Returns the half width of the 95 % interval of each coordinate of the fit; `None` if the measurement does not determine them.
+/// Returns the half-width of the 95 % interval of each coordinate of the fit; `None` if the measurement does not determine them.
 pub(crate) fn half_widths(fit: &Fit, noise_n: f64) -> Option<Vec<f64>> {
     let (count, width) = fit.jacobian_n.shape();
     let weight = 1.0 / (noise_n * noise_n);
@@ -37,7 +38,7 @@ pub(crate) fn half_widths(fit: &Fit, noise_n: f64) -> Option<Vec<f64>> {
     Some(widths.collect())
 }
 
-/// Variance of the sum of a correlated series, and the number of neighbours that it comes from.
+/// Variance of the sum of a correlated series, and the number of lags used.
 struct Sum {
     variance: f64,
     lags: usize,
@@ -56,17 +57,17 @@ fn variance_of_sum(values: &[f64]) -> Sum {
     Sum { variance: density * values.len() as f64 / (kept * kept), lags }
 }
 
-/// Structure of residuals, which noise does not have.
+/// Structure of residuals: the part that is not noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Structure {
     /// Root mean square of the part of the residuals that persists over some cells, N.
     pub(crate) rms_n: f64,
-    /// The same mean square over its standard deviation under white noise.
+    /// Mean square of this part over its standard deviation under white noise.
     pub(crate) deviations: f64,
 }
 
-/// Measures the structure of residuals: their covariance two and three cells apart, so that the short correlation of a filtered noise
-/// does not count.
+/// Measures the structure of residuals: their covariance two and three cells apart, so that the short correlation of filtered
+/// noise does not count.
 pub(crate) fn structure(residuals_n: &[f64]) -> Structure {
     let count = residuals_n.len() as f64;
     let square = autocovariance(residuals_n, 0);
@@ -83,14 +84,14 @@ fn autocovariance(values: &[f64], lag: usize) -> f64 {
     products / values.len() as f64
 }
 
-/// Returns the first autocorrelation.
+/// Returns the autocorrelation at lag one.
 fn correlation(values: &[f64]) -> f64 {
     let square = autocovariance(values, 0);
     let ratio = if square > 0.0 { autocovariance(values, 1) / square } else { 0.0 };
     ratio.clamp(-MOST_CORRELATION, MOST_CORRELATION)
 }
 
-/// Returns the number of neighbours for a first-order autocorrelation (Andrews 1991, equations 5.3 and 6.4).
+/// Returns the number of lags for a first-order autocorrelation (Andrews 1991, equations 5.3 and 6.4).
 fn bandwidth(values: &[f64]) -> usize {
     let correlation = correlation(values);
     let (minus, plus) = (1.0 - correlation, 1.0 + correlation);

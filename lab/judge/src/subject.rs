@@ -24,7 +24,7 @@ const MOST_HOLDS: usize = 2000;
 /// Creates and prepares an instance for a loop of 1 kHz.
 ///
 /// # Errors
-/// [`LoadError`] if the plugin is no model, or rejects the settings or the loop.
+/// [`LoadError`] if the plugin is not a model, or rejects the settings or the loop.
 pub fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Result<Model, LoadError> {
     prepared_for(plugin, settings, &LoopConfig { period_ns: PERIOD_NS, seed })
 }

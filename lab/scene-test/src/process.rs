@@ -54,7 +54,7 @@ impl Flotor {
         let mut command = Self::PROGRAM.command().map_err(|error| error.to_string())?;
         let ran = self
             .try_run(command.args(arguments), input)
-            .map_err(|cause| format!("cannot run flotor, or keep its output in a temporary file: {cause}"))?;
+            .map_err(|cause| format!("cannot run flotor, or keep its output in a temporary file: {cause}; check the permissions and the free disk space"))?;
         ran.ok_or_else(|| {
             format!(
                 "the process did not end within {} s, and was killed; raise the limit with --timeout",

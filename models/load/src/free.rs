@@ -127,7 +127,7 @@ impl FreeBody {
         let outward_m = handle_m - self.centre_m;
         let distance_m = outward_m.length();
         let depth_m = self.radius_m - distance_m;
-        // A handle at the very centre has no direction, and NaN is no depth.
+        // A handle at the very centre has no direction, and NaN is not a depth.
         if !(depth_m > 0.0 && distance_m > 0.0) {
             return Push::default();
         }

@@ -14,7 +14,7 @@
 //! Devices can share a load: a weight hangs on all hands in equal parts, a resistance resists each of them. A third kind, `free`,
 //! is a ball without weight that one hand pushes to the other ([`free`]).
 //!
-//! On a device with a linear grip the load is a thing between the fingers: a spring that pushes them apart below its width.
+//! On a device with a linear grip the load is an object between the fingers: a spring that pushes them apart below its width.
 
 pub mod free;
 
@@ -51,7 +51,7 @@ pub struct Load {
     kind: Kind,
     force_n: f64,
     onset_m: f64,
-    /// Stiffness, N/m, and width, m, of the thing between the fingers.
+    /// Stiffness, N/m, and width, m, of the object between the fingers.
     grip_stiffness_n_per_m: f64,
     grip_width_m: f64,
     body: FreeBody,
@@ -96,7 +96,7 @@ impl Load {
         &self.body
     }
 
-    /// Sets stiffness, N/m, and width, m, of the thing between the fingers.
+    /// Sets stiffness, N/m, and width, m, of the object between the fingers.
     #[must_use]
     pub fn with_grip(self, grip_stiffness_n_per_m: f64, grip_width_m: f64) -> Self {
         Self { grip_stiffness_n_per_m, grip_width_m, ..self }
@@ -206,7 +206,7 @@ impl ForceModel for Load {
             0.0,
             5000.0,
             0.0,
-            "Stiffness of the thing between the fingers, on a device with a linear grip",
+            "Stiffness of the object between the fingers, on a device with a linear grip",
         )
         .live(),
         Parameter::real(
@@ -215,7 +215,7 @@ impl ForceModel for Load {
             0.0,
             200.0,
             15.0,
-            "Width of the thing between the fingers: a wider grip feels nothing",
+            "Width of the object between the fingers; a wider grip has no contact",
         )
         .live(),
         Parameter::real("mass_g", "g", 10.0, 1.0e4, BODY[0] * 1.0e3, "Mass of the ball (kind free)"),

@@ -51,10 +51,10 @@ pub fn parse(text: &str) -> Result<Curve, TextProblem> {
             let [(before_m, before_n), (now_m, now_n)] =
                 [at.saturating_sub(1), at].map(|index| knots.get(index).copied().unwrap_or_default());
             let problem = if now_m > before_m {
-                format!("the force falls from {before_n} N in the row before to {now_n} N")
+                format!("the force decreases from {before_n} N in the row before to {now_n} N")
             } else {
                 format!(
-                    "the compression does not grow: {:.6} mm in the row before, then {:.6} mm",
+                    "the compression does not increase: {:.6} mm in the row before, then {:.6} mm",
                     before_m * 1.0e3,
                     now_m * 1.0e3
                 )

@@ -78,7 +78,7 @@ fn what_is_no_curve_is_refused() {
     assert!(refused("compression_mm,force_n\n0,0\n1,nan\n").starts_with("c:3: `force_n` must be finite"));
     assert!(
         refused("# bench\ncompression_mm,force_n\n0,0\n2,3\n1,4\n")
-            .starts_with("c:5: the compression does not grow: 2.000000 mm")
+            .starts_with("c:5: the compression does not increase: 2.000000 mm")
     );
     assert!(parse("# bench\n\ncompression_mm, force_n\n0, 0\n1, 2\n2, 4\n").is_ok());
 }

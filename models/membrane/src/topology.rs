@@ -37,7 +37,7 @@ impl Topology {
         let (places_m, place_of) = joined(obj);
         if places_m.len() > MOST_PLACES {
             let problem = format!(
-                "{} different vertices are too many, at most {MOST_PLACES}; use a coarser mesh",
+                "the mesh has {} different vertices, above the limit of {MOST_PLACES}; use a coarser mesh",
                 places_m.len()
             );
             return Err(TextProblem::of_file(problem));

@@ -31,7 +31,7 @@ fn bisect(mut low: f64, mut high: f64, function: impl Fn(f64) -> f64) -> f64 {
 
 /// Finds all roots inside -1..1 of a function that has exactly `count`, by a fine search for sign changes.
 fn roots(count: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
-    let cells = 1000 * count.max(1) + 1; // odd, so that zero is no cell border
+    let cells = 1000 * count.max(1) + 1; // odd, so that zero is not a cell border
     let at = |i: usize| -1.0 + 2.0 * (i as f64 + 0.5) / (cells as f64 + 1.0);
     let mut found = Vec::with_capacity(count);
     for i in 0..cells {

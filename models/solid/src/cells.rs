@@ -207,10 +207,15 @@ impl Geometry<'_> {
     /// Returns the stiffness matrix of the element, N/m: column-major, three degrees of freedom per node.
     #[must_use]
     pub fn stiffness(&self, lame: Lame) -> Vec<f64> {
+        self.stiffness_by(&self.kind.rule(), lame)
+    }
+
+    /// Returns the stiffness matrix as [`Self::stiffness`], integrated with other points.
+    pub(crate) fn stiffness_by(&self, rule: &[Point<3>], lame: Lame) -> Vec<f64> {
         let count = self.kind.nodes();
         let size = 3 * count;
         let mut matrix = vec![0.0; size * size];
-        for (at, weight) in self.kind.rule() {
+        for &(at, weight) in rule {
             let (slopes, determinant) = self.slopes(at);
             let volume = weight * determinant;
             for (b, db) in slopes.iter().enumerate() {

@@ -87,7 +87,7 @@ impl Gatherer {
     fn brick(&mut self, place: &dyn Fn([f64; 3]) -> [f64; 3]) {
         let nodes = Kind::Brick.node_places().into_iter().map(|at| self.node(place(at))).collect();
         let tag = self.parts.elements.len() + 1;
-        self.parts.elements.push(Element { kind: Kind::Brick, nodes, tag });
+        self.parts.elements.push(Element { kind: Kind::Brick, nodes, tag, region: 0 });
     }
 
     #[allow(clippy::cast_possible_truncation)] // 1e7 units to a radius

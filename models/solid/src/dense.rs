@@ -1,12 +1,12 @@
 //! Dense symmetric matrices: partial Cholesky factorisation of a front, and triangular solves.
 //!
-//! Every sum has one fixed order: tiles are arrays of four that a compiler may put into registers of any width, and
+//! Every sum has one fixed order: tiles are arrays of eight that a compiler may put into registers of any width, and
 //! products are rounded before they are added, so the result is the same to the bit at any width.
 
 /// Columns of a panel: a panel of a front of 2000 rows fits the second-level cache.
 const PANEL: usize = 48;
-/// Side length of a tile of the update.
-const TILE: usize = 4;
+/// Rows and columns of a tile of the update.
+const TILE: usize = 8;
 
 /// Error for a pivot that is not positive: the matrix is not positive definite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,32 +66,48 @@ fn update_rest(matrix: &mut [f64], size: usize, first: usize, last: usize, packe
             packed[(row / TILE) * width + k][row % TILE] = value;
         }
     }
-    for column_tile in 0..tiles {
-        let right = &packed[column_tile * width..(column_tile + 1) * width];
-        let columns = TILE.min(rows - column_tile * TILE);
-        for row_tile in column_tile..tiles {
-            let left = &packed[row_tile * width..(row_tile + 1) * width];
-            let product = multiply_tiles(left, right);
-            let height = TILE.min(rows - row_tile * TILE);
-            for (c, sums) in product.iter().enumerate().take(columns) {
-                let start = (last + column_tile * TILE + c) * size + last + row_tile * TILE;
-                matrix[start..start + height].iter_mut().zip(sums).for_each(|(value, s)| *value -= s);
-            }
-        }
-    }
+    pulp::Arch::new().dispatch(Update { matrix, packed, size, last, width });
 }
 
-#[inline]
-fn multiply_tiles(left: &[[f64; TILE]], right: &[[f64; TILE]]) -> [[f64; TILE]; TILE] {
-    let mut sums = [[0.0; TILE]; TILE];
-    for (l, r) in left.iter().zip(right) {
-        for (column, &scale) in sums.iter_mut().zip(r) {
-            for (sum, &value) in column.iter_mut().zip(l) {
-                *sum += value * scale;
+/// Update of a trailing submatrix, in registers of any width: the same sums, and the same bits.
+struct Update<'a> {
+    matrix: &'a mut [f64],
+    packed: &'a [[f64; TILE]],
+    size: usize,
+    last: usize,
+    width: usize,
+}
+
+impl pulp::WithSimd for Update<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { matrix, packed, size, last, width } = self;
+        let rows = size - last;
+        for (column_tile, right) in packed.chunks_exact(width).enumerate() {
+            for (row_tile, left) in packed.chunks_exact(width).enumerate().skip(column_tile) {
+                let mut product = [[0.0; TILE]; TILE];
+                for part in 0..TILE / S::F64_LANES {
+                    let mut sums = [simd.splat_f64s(0.0); TILE];
+                    for (l, r) in left.iter().zip(right) {
+                        let value = S::as_simd_f64s(l).0[part];
+                        for (sum, scale) in sums.iter_mut().zip(r) {
+                            *sum = simd.add_f64s(*sum, simd.mul_f64s(value, simd.splat_f64s(*scale)));
+                        }
+                    }
+                    for (column, sum) in product.iter_mut().zip(sums) {
+                        S::as_mut_simd_f64s(column).0[part] = sum;
+                    }
+                }
+                let height = TILE.min(rows - row_tile * TILE);
+                for (c, sums) in product.iter().enumerate().take(rows - column_tile * TILE) {
+                    let start = (last + column_tile * TILE + c) * size + last + row_tile * TILE;
+                    matrix[start..start + height].iter_mut().zip(sums).for_each(|(v, s)| *v -= s);
+                }
             }
         }
     }
-    sums
 }
 
 /// Solves `A x = b` for one right-hand side, in place, with the complete Cholesky factor of `A`. Not real-time.

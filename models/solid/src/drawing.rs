@@ -274,7 +274,7 @@ impl Contact {
     }
 }
 
-/// Returns the contact radius of a sphere at a depth, m: Hertz's radius, reduced at large depth, where a sphere is no paraboloid.
+/// Returns the contact radius of a sphere at a depth, m: Hertz's radius, reduced at large depth, where a sphere is not a paraboloid.
 fn contact_radius_m(sphere_m: f64, depth_m: f64) -> f64 {
     (sphere_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / sphere_m)
 }

@@ -42,11 +42,6 @@ impl Jet {
         self.chain(inverse, -inverse * inverse)
     }
 
-    /// Returns the larger of this number and a constant; slope zero where both are equal.
-    pub fn at_least(self, least: f64) -> Self {
-        if self.value > least { self } else { Self::constant(least) }
-    }
-
     /// Returns the absolute value.
     pub fn abs(self) -> Self {
         if self.value < 0.0 { -self } else { self }

@@ -9,6 +9,7 @@
 //! - [`remainder`], [`table`]: difference between a block and a half-space, by finite elements.
 //! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
 //!   difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
+//! - [`refinement`], [`condensation`], [`touch`]: contact of a ball with any part of a body of tetrahedra, at one place.
 //! - [`sphere`]: contact solver of a sphere. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`description`], [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`several`], [`rigid`], [`friction`]: laws evaluated in a tick, with the numerics of [`jet`] and [`spline`].
@@ -24,6 +25,7 @@ pub mod basis;
 pub mod body;
 pub mod cache;
 pub mod cells;
+pub mod condensation;
 pub mod cylinder;
 pub mod dense;
 pub mod description;
@@ -43,6 +45,7 @@ mod plugin;
 pub mod prepare;
 pub mod punch;
 pub mod recovery;
+pub mod refinement;
 pub mod remainder;
 pub mod rigid;
 pub mod several;
@@ -51,5 +54,6 @@ pub mod sphere;
 pub mod spline;
 pub mod table;
 pub mod tetrahedra;
+pub mod touch;
 
 pub use plugin::{FLOTOR_ENTRY, Solid};

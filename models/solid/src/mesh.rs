@@ -15,6 +15,8 @@ pub struct Element {
     pub nodes: Vec<usize>,
     /// Number of the element in the file.
     pub tag: usize,
+    /// Index of the physical volume in [`Parts::regions`].
+    pub region: usize,
 }
 
 /// Face of an element that no other element shares.
@@ -37,6 +39,8 @@ pub struct Parts {
     pub surfaces: BTreeMap<String, Vec<Vec<usize>>>,
     /// Corners of all faces in the file.
     pub faces: Vec<Vec<usize>>,
+    /// Names of the physical volumes; the first, empty, is that of elements without a volume.
+    pub regions: Vec<String>,
 }
 
 /// Validated mesh of a body; the origin is the middle of the touched face.
@@ -52,6 +56,8 @@ pub struct Mesh {
     pub touched: Vec<Facet>,
     /// Part of the surface that is neither touched nor fixed.
     pub free: Vec<Facet>,
+    /// Names of the physical volumes.
+    pub regions: Vec<String>,
 }
 
 /// Reason why a mesh is invalid.
@@ -197,7 +203,7 @@ impl fmt::Display for MeshError {
             Self::Extent { extent_m } => write!(
                 f,
                 "the longest side of the mesh is {extent_m} m, but must be above 0 and at most 10 m: coordinates are \
-                 finite numbers in metres (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
+                 finite numbers in metres (`unit = \"mm\"`: in millimetres)"
             ),
         }
     }
@@ -231,7 +237,28 @@ impl Mesh {
     /// # Errors
     /// A [`MeshError`] that names the place and the remedy.
     pub fn new(parts: Parts, fixed_name: &str, touched_name: &str) -> Result<Self, MeshError> {
-        let Parts { mut nodes_m, elements, surfaces, faces } = parts;
+        let mut mesh = Self::in_place(parts, fixed_name, Some(touched_name))?;
+        let (mut area, mut centre) = (0.0, [0.0; 3]);
+        for facet in &mesh.touched {
+            for point in facet.points(&mesh.nodes_m) {
+                let size = point.normal_m2.iter().map(|c| c * c).sum::<f64>().sqrt();
+                area += size;
+                centre.iter_mut().zip(point.position_m).for_each(|(sum, c)| *sum += size * c);
+            }
+        }
+        for node in &mut mesh.nodes_m {
+            node.iter_mut().zip(centre).for_each(|(x, c)| *x -= c / area);
+        }
+        Ok(mesh)
+    }
+
+    /// Validates a mesh and keeps its coordinates; without `touched_name` all of the surface is touched that is not fixed. Not
+    /// real-time.
+    ///
+    /// # Errors
+    /// A [`MeshError`] that names the place and the remedy.
+    pub fn in_place(parts: Parts, fixed_name: &str, touched_name: Option<&str>) -> Result<Self, MeshError> {
+        let Parts { nodes_m, elements, surfaces, faces, regions } = parts;
         if elements.is_empty() {
             return Err(MeshError::NoVolume { open_m: open_edge(&nodes_m, &faces) });
         }
@@ -239,18 +266,19 @@ impl Mesh {
         for element in &elements {
             check_element(&nodes_m, element)?;
         }
-        let faces_of = |name: &str| {
-            surfaces.get(name).into_iter().flatten().map(|face| sorted(face)).collect::<BTreeSet<_>>()
-        };
-        if fixed_name == touched_name {
+        if touched_name == Some(fixed_name) {
             return Err(MeshError::SameName { name: fixed_name.to_owned() });
         }
         let shared = |node: usize| MeshError::Shared {
             fixed: fixed_name.to_owned(),
-            touched: touched_name.to_owned(),
+            touched: touched_name.unwrap_or_default().to_owned(),
             at_m: nodes_m[node],
         };
-        if let Some(&node) = faces_of(fixed_name).intersection(&faces_of(touched_name)).flatten().next() {
+        let faces_of = |name: &str| {
+            surfaces.get(name).into_iter().flatten().map(|face| sorted(face)).collect::<BTreeSet<_>>()
+        };
+        let both = touched_name.map(|name| &faces_of(fixed_name) & &faces_of(name)).unwrap_or_default();
+        if let Some(&node) = both.iter().flatten().next() {
             return Err(shared(node));
         }
         let mut border = border(&elements)?;
@@ -272,26 +300,17 @@ impl Mesh {
                 })
                 .collect()
         };
-        let (clamped, touched) = (take("fixed", fixed_name)?, take("touched", touched_name)?);
+        let clamped = take("fixed", fixed_name)?;
+        let touched = touched_name.map_or(Ok(Vec::new()), |name| take("touched", name))?;
         let mut fixed = vec![false; nodes_m.len()];
         clamped.iter().flat_map(|facet| &facet.nodes).for_each(|&node| fixed[node] = true);
         if let Some(&node) = touched.iter().flat_map(|facet| &facet.nodes).find(|&&node| fixed[node]) {
             return Err(shared(node));
         }
         check_held(&elements, &fixed)?;
-        let free = border.into_values().collect();
-        let (mut area, mut centre) = (0.0, [0.0; 3]);
-        for facet in &touched {
-            for point in facet.points(&nodes_m) {
-                let size = point.normal_m2.iter().map(|c| c * c).sum::<f64>().sqrt();
-                area += size;
-                centre.iter_mut().zip(point.position_m).for_each(|(sum, c)| *sum += size * c);
-            }
-        }
-        for node in &mut nodes_m {
-            node.iter_mut().zip(centre).for_each(|(x, c)| *x -= c / area);
-        }
-        Ok(Self { nodes_m, elements, fixed, touched, free })
+        let free: Vec<Facet> = border.into_values().collect();
+        let (touched, free) = if touched_name.is_some() { (touched, free) } else { (free, Vec::new()) };
+        Ok(Self { nodes_m, elements, fixed, touched, free, regions })
     }
 }
 

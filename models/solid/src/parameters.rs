@@ -31,6 +31,10 @@ choice! {
     ToolChoice { Sphere = "sphere", Plate = "plate", PunchRound = "punch-round", PunchSquare = "punch-square" }
 }
 
+choice! {
+    /// Unit of the coordinates of a mesh.
+    Unit { Metre = "m", Millimetre = "mm" }
+}
 const BONDS: Choices = choices!["bonded", "frictionless"];
 
 /// Returns the bond of a punch.
@@ -114,11 +118,11 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "file",
         choices![],
-        "Mesh for `body = \"file\"`: Gmsh 4.1 ASCII (.msh), coordinates in m, 10-node tetrahedra or 20-node \
-         hexahedra",
+        "Mesh for `body = \"file\"`: Gmsh 4.1 (.msh), 10-node tetrahedra or 20-node hexahedra",
     ),
     Parameter::text("fixed_face", "Name of the fixed physical surface of the mesh (default: fixed)"),
     Parameter::text("touched_face", "Name of the touched physical surface of the mesh (default: touched)"),
+    Parameter::choice("unit", Unit::WORDS, 0, "Unit of the coordinates of the mesh"),
 ];
 
 /// Returns the value of every parameter: from the settings, or the default. A beam has its own default sizes.

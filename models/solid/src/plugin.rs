@@ -5,7 +5,7 @@ use crate::drawing::Drawing;
 use crate::friction::Friction;
 use crate::law::{Law, no_mesh};
 use crate::mesh::Mesh;
-use crate::parameters::{BodyChoice, SCHEMA, YOUNGS_MODULUS, resolve};
+use crate::parameters::{BodyChoice, SCHEMA, Unit, YOUNGS_MODULUS, resolve};
 use crate::several::{self, MAX_SPHERES};
 use crate::{cache, gmsh};
 use flotor_hal::{
@@ -74,13 +74,16 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     })?;
     let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
     let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
-    // Accept a binary file here: the reader reports its format from the second line.
-    let text =
-        text_from_bytes(bytes.clone()).unwrap_or_else(|_| String::from_utf8_lossy(&bytes).into_owned());
-    let parts = gmsh::read(&text).map_err(|problem| wrong(&problem))?;
+    // Accept malformed text here: the reader reports it with its line.
+    let text = text_from_bytes(bytes.clone()).or_else(|_| gmsh::to_text(&bytes)).map_err(|p| wrong(&p))?;
+    let mut parts = gmsh::read(&text).map_err(|problem| wrong(&problem))?;
+    let unit = Unit::of(settings, "unit");
+    if unit == Unit::Millimetre {
+        parts.nodes_m.as_flattened_mut().iter_mut().for_each(|c| *c *= 1.0e-3);
+    }
     let mesh = Mesh::new(parts, fixed, touched).map_err(|problem| wrong(&problem))?;
     let named = [&bytes[..], b"\0", fixed.as_bytes(), b"\0", touched.as_bytes()].concat();
-    Ok(Some((mesh, cache::digest(&named))))
+    Ok(Some((mesh, cache::digest(&named) ^ u64::from(unit == Unit::Millimetre))))
 }
 
 /// Returns the status of several spheres. `Clamped` (too deep) has priority over `NotConverged`, and this over `OutOfDomain`.

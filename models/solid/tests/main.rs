@@ -36,3 +36,4 @@ fn leaves_out_long_tests() -> bool {
     }
     is_quick
 }
+mod anywhere;

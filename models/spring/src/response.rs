@@ -49,7 +49,7 @@ impl Response {
         }
     }
 
-    /// Returns the response if finite, otherwise no wrench: overflow beside a pole is no answer.
+    /// Returns the response if finite, otherwise no wrench: overflow beside a pole is not an answer.
     pub(crate) fn if_finite(self) -> Self {
         // One sum instead of six tests: the sum is finite only if every term is.
         let sum = self.force_n.element_sum() + self.torque_nm.element_sum() + self.energy_j.unwrap_or(0.0);

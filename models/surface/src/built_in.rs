@@ -1,4 +1,4 @@
-//! Objects made by formulas, with their top 2 mm below home.
+//! Built-in objects, computed from formulas; the top of each is 2 mm below home.
 
 use crate::soup::Soup;
 use flotor_hal::{DVec3, math};
@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Distance of the top of a built-in object below home, m.
 const BELOW_M: f64 = 2.0e-3;
-/// Cells about the axis and along it.
+/// Number of cells about the axis and along the axis.
 const CELLS: [u32; 2] = [128, 64];
 
 /// Returns the triangles of a built-in object in metres; `None` for an unknown name.
@@ -55,7 +55,7 @@ fn globe(rings: u32, meridians: u32, radius_m: impl Fn(DVec3) -> f64) -> Soup {
     soup
 }
 
-/// Torus that lies flat: radii of 20 and 8 mm.
+/// Returns a horizontal torus with radii of 20 and 8 mm.
 fn torus() -> Soup {
     let mut soup = Soup { metres: Some(1.0), ..Soup::default() };
     let [n, m] = CELLS;

@@ -1,7 +1,8 @@
-//! Disk cache of large surfaces: a million patches are read in the time of their bytes. Not real-time.
+//! Disk cache of large surfaces: loading a million patches takes no longer than reading their bytes. Not real-time.
 //!
-//! A file has the key of its surface, the patches, and a checksum; a file that differs anywhere is ignored and rewritten. Small
-//! surfaces are built faster than a folder is searched. The cache has the latest few files.
+//! A file contains the key of its surface, the patches and a checksum; a file with another key or checksum is ignored and
+//! rewritten. Small surfaces are not cached: building one is faster than a search of the folder. The cache keeps the
+//! [`MOST_FILES`] newest files.
 
 use crate::object::Object;
 use crate::patch::Patch;
@@ -12,20 +13,20 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::PathBuf;
 
-/// First bytes of a file. Raise the version when the same mesh would give other patches.
+/// Magic bytes of a file. Raise the version if the same mesh would give different patches.
 const MAGIC: &[u8; 16] = b"flotor-surf  01\n";
-/// Fewest patches of a file.
+/// Minimum number of patches of a cached surface.
 const LEAST: usize = 50_000;
-/// Most files in the cache.
+/// Maximum number of files in the cache.
 const MOST_FILES: usize = 4;
-/// Longest description, bytes.
+/// Maximum length of a description, bytes.
 const LONGEST: usize = 1 << 24;
-/// Bytes of a patch with its neighbours.
+/// Size of a patch with its neighbours, bytes.
 const RECORD: usize = Patch::BYTES + 16;
-/// Patches of a block of reading and writing.
+/// Number of patches read or written at a time.
 const BLOCK: usize = 4096;
 
-/// Continues the 64-bit hash of a file: finds the same file again and damage, no protection against intent.
+/// Updates a 64-bit hash with bytes. Identifies a file and detects damage; not cryptographic.
 pub(crate) fn digest(hash: u64, bytes: &[u8]) -> u64 {
     let step = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
     let (words, rest) = bytes.as_chunks::<8>();
@@ -52,7 +53,7 @@ pub(crate) fn load(key: &str) -> Option<Object> {
     decode(&mut BufReader::with_capacity(BLOCK * RECORD, file), key, most)
 }
 
-/// Stores a large object. Ignores a failure: the next start builds anew.
+/// Stores a large object. Ignores a failure: the next start builds the surface again.
 pub(crate) fn store(key: &str, object: &Object) {
     let Some(path) = file(key).filter(|_| object.surface.count() >= LEAST) else { return };
     let Some(folder) = path.parent().filter(|folder| fs::create_dir_all(folder).is_ok()) else { return };

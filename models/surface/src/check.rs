@@ -1,22 +1,22 @@
-//! Faces that run through each other: there a ball may be held on the wrong face, so the place is named. Not real-time.
+//! Self-intersections of a surface, where a ball may be held on the wrong face. Not real-time.
 
 use crate::parallel::on_ranges;
 use crate::surface::Surface;
 use flotor_hal::DVec3;
 
-/// Share of a face or an edge that must lie on either side: faces that only touch do not cross.
+/// Minimum fraction of a face or an edge on either side of an intersection: faces that only touch do not intersect.
 const CLEAR: f64 = 1.0e-6;
 
-/// Pairs of faces that run through each other.
+/// Pairs of intersecting faces.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Crossings {
     /// Number of pairs.
     pub count: usize,
-    /// Place of the first pair, m.
+    /// Position of the first intersection, m.
     pub first_m: Option<DVec3>,
 }
 
-/// Finds pairs of flat faces that run through each other.
+/// Finds the pairs of intersecting flat faces.
 #[must_use]
 pub fn crossings(surface: &Surface) -> Crossings {
     let parts = on_ranges(surface.count(), |range| {
@@ -46,8 +46,8 @@ pub fn crossings(surface: &Surface) -> Crossings {
     })
 }
 
-/// Returns where an edge of the first triangle runs through the inside of the second, m (Moeller and Trumbore 1997, J. Graphics
-/// Tools 2(1), 21-28).
+/// Returns the point where an edge of the first triangle crosses the inside of the second, m (Moeller and Trumbore 1997, J.
+/// Graphics Tools 2(1), 21-28).
 fn crossing_m(edges: &[DVec3; 3], [p, q, r]: &[DVec3; 3]) -> Option<DVec3> {
     (0..3).find_map(|i| {
         let (from, to) = (edges[i], edges[(i + 1) % 3]);

@@ -2,7 +2,7 @@
 //!
 //! Minimises `f = |S(x) - c|^2 / 2` over barycentric coordinates. A coordinate at zero is held there while the derivative of `f`
 //! towards the inside is not negative (Bertsekas 1982, SIAM J. Control Optim. 20, 221-246). The Hessian is exact; where it is not
-//! positive definite, deep inside a strong curvature, that of Gauss and Newton replaces it.
+//! positive definite, beyond the centre of curvature, the Gauss-Newton matrix replaces it.
 
 use crate::patch::{Barycentric, Jet, Patch};
 use flotor_hal::DVec3;
@@ -10,7 +10,7 @@ use flotor_hal::DVec3;
 /// Closest point of a patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Foot {
-    /// Place in the patch.
+    /// Barycentric coordinates in the patch.
     pub at: Barycentric,
     /// Point, m.
     pub point_m: DVec3,
@@ -20,19 +20,20 @@ pub struct Foot {
     pub distance_m: f64,
 }
 
-/// Most Newton steps; six are usual from the middle of a patch.
+/// Maximum number of Newton steps; six are usual from the middle of a patch.
 const MOST_STEPS: usize = 40;
-/// Step below which the next one, squared, is below rounding, relative to the size of the patch.
+/// Length of a step below which the next step is below rounding (quadratic convergence), relative to the size of the patch.
 const LAST_STEP: f64 = 1.0e-8;
-/// Next step, as two steps of quadratic convergence predict it, that is below rounding.
+/// Length of the next step, predicted from the last two by quadratic convergence, below which the next step is below rounding,
+/// relative to the size of the patch.
 const NEXT_STEP: f64 = 1.0e-14;
-/// Step up to which a quadratic describes the distance well, relative to the size of the patch.
+/// Maximum length of a step for which the distance is nearly quadratic, relative to the size of the patch.
 const SHORT_STEP: f64 = 0.25;
-/// Most halvings of a step that does not lessen the distance.
+/// Maximum number of halvings of a step that does not reduce the distance (backtracking).
 const MOST_HALVINGS: usize = 12;
 
-/// Returns the closest point of the flat triangle as a place, and its squared distance (Ericson 2005, Real-Time Collision
-/// Detection, 5.1.5). Real-time: bounded, no allocation.
+/// Returns the barycentric coordinates of the closest point of the flat triangle, and its squared distance, m², (Ericson 2005,
+/// Real-Time Collision Detection, 5.1.5). Real-time: bounded, no allocation.
 pub(crate) fn closest_of_triangle(corners_m: &[DVec3; 3], c: DVec3) -> (Barycentric, f64) {
     let [p, q, r] = *corners_m;
     let (pq, pr, pc) = (q - p, r - p, c - p);
@@ -69,13 +70,13 @@ pub(crate) fn closest_of_triangle(corners_m: &[DVec3; 3], c: DVec3) -> (Barycent
         let sum = va + vb + vc;
         [va / sum, vb / sum, vc / sum]
     };
-    // A triangle without area has no inside: its first corner is as near as rounding says.
+    // Degenerate triangle: its corners coincide to rounding.
     let place = if place.iter().all(|x| x.is_finite()) { place } else { [1.0, 0.0, 0.0] };
     let point_m = p * place[0] + q * place[1] + r * place[2];
     (place, (point_m - c).length_squared())
 }
 
-/// Gradient and Hessian of `f` by the first two coordinates.
+/// Gradient and Hessian of `f` with respect to the first two coordinates.
 struct Quadratic {
     gradient: [f64; 2],
     hessian: [f64; 3],
@@ -98,7 +99,7 @@ impl Quadratic {
     }
 }
 
-/// Directions in which the two coordinates change while the third compensates, by the coordinate held at zero.
+/// Change of the first two coordinates along each side, in the order of the coordinate that is zero there.
 const SIDES: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 0.0], [1.0, -1.0]];
 
 impl Quadratic {
@@ -106,7 +107,7 @@ impl Quadratic {
         is_positive(self.hessian)
     }
 
-    /// Returns the Newton step in the three coordinates, with those of `held` at zero.
+    /// Returns the Newton step in the three coordinates; the coordinates `held` do not change.
     fn step(&self, held: [bool; 3]) -> [f64; 3] {
         let [ga, gb] = self.gradient;
         let step = match held.iter().filter(|h| **h).count() {
@@ -148,19 +149,19 @@ fn held_and_step(quadratic: &Quadratic, at: Barycentric) -> [f64; 3] {
 }
 
 impl Patch {
-    /// Finds the local closest point to `c_m` from the place `start`. Real-time: bounded, no allocation.
+    /// Finds the local closest point to `c_m`, starting at the coordinates `start`. Real-time: bounded, no allocation.
     #[must_use]
     pub fn closest(&self, c_m: DVec3, start: Barycentric) -> Foot {
         self.descend(c_m, start, f64::INFINITY)
     }
 
-    /// Finds the place that [`Self::closest`] finds if it is nearer than `bound_m`.
+    /// Finds the local closest point as [`Self::closest`]; `None` if it is not nearer than `bound_m`.
     pub(crate) fn closest_within(&self, c_m: DVec3, start: Barycentric, bound_m: f64) -> Option<Foot> {
         let foot = self.descend(c_m, start, bound_m);
         (foot.distance_m < bound_m).then_some(foot)
     }
 
-    /// Descends from `start` to the closest point, or to a place from which no point nearer than `bound_m` is to be expected.
+    /// Descends from `start` to the closest point; stops early where no point nearer than `bound_m` is expected.
     fn descend(&self, c_m: DVec3, start: Barycentric, bound_m: f64) -> Foot {
         if self.is_flat() {
             let (at, square) = closest_of_triangle(&self.corners_m, c_m);
@@ -176,7 +177,7 @@ impl Patch {
             let quadratic = Quadratic::of(self, at, &jet, c_m);
             let step = held_and_step(&quadratic, at);
             let size = step[0].abs().max(step[1].abs()).max(step[2].abs());
-            // The step lessens the squared distance by its slope; twice as much is allowed for.
+            // The first-order decrease of the squared distance in this step, with a safety factor of two.
             let slope = quadratic.gradient[0] * step[0] + quadratic.gradient[1] * step[1];
             let is_too_far =
                 size < SHORT_STEP && quadratic.is_convex() && square + 2.0 * slope > bound_m * bound_m;
@@ -203,7 +204,7 @@ impl Patch {
                 next = next.map(|x| x / sum);
                 let there = self.jet(next);
                 let found = (there.point_m - c_m).length_squared();
-                // Rounding may raise the distance in the last step.
+                // Rounding may increase the distance in the last step.
                 if found <= square * (1.0 + 1.0e-14) || size * share < LAST_STEP {
                     moved = Some((next, there, found));
                     break;
@@ -226,7 +227,8 @@ impl Patch {
         Foot { at, point_m: jet.point_m, normal, distance_m: square.sqrt() }
     }
 
-    /// Finds the closest point to `c_m` from the place below it in the flat triangle. Real-time: bounded, no allocation.
+    /// Finds the local closest point to `c_m`, starting at the closest point of the flat triangle. Real-time: bounded, no
+    /// allocation.
     #[must_use]
     pub fn nearest(&self, c_m: DVec3) -> Foot {
         let (start, _) = closest_of_triangle(&self.corners_m, c_m);

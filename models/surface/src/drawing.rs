@@ -5,16 +5,17 @@ use crate::touch::{Answer, Friction};
 use crate::weld::{Numbers, mix};
 use flotor_hal::{DQuat, DVec3, Form, Part, Pose, Primitive, Shape, Sides, SurfaceVertex};
 
-/// Most triangles of a picture: the limit of the contract.
+/// Maximum number of triangles of a picture: the limit of the contract.
 const MOST_TRIANGLES: usize = (1 << 20) - 1;
 /// Radius of a drawn point and of a contact, m.
 const POINT_M: f64 = 3.0e-4;
-/// Length of the drawn normal, m; of a resting ball its radius is doubled.
+/// Length of the drawn normal, m.
 const NORMAL_M: f64 = 4.0e-3;
-/// Radius of the drawn normal, m.
+/// Radius of the drawn normal, m; doubled while the proxy sticks.
 const LINE_M: f64 = 1.0e-4;
 
-/// Returns the triangles of a surface with its smooth normals; of a surface beyond the limit of the contract every n-th one.
+/// Returns the triangles of a surface with its smooth normals; only every n-th triangle if there are more than the contract
+/// permits.
 #[allow(clippy::cast_possible_truncation)] // fewer than 2^20
 pub(crate) fn body(surface: &Surface) -> Shape {
     let every = surface.count().div_ceil(MOST_TRIANGLES).max(1);

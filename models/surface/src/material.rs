@@ -12,13 +12,13 @@ pub struct Material {
     pub damping_ns_per_m: f64,
     /// Coefficient of friction at which a resting ball begins to slide.
     pub static_friction: f64,
-    /// Coefficient of friction of a sliding ball; at most the static one counts.
+    /// Coefficient of friction of a sliding ball; limited to the static coefficient.
     pub kinetic_friction: f64,
     /// Viscous friction along the surface, N s/m.
     pub viscous_ns_per_m: f64,
 }
 
-/// Values that a material has of its own.
+/// Values that a group overrides; `None` for the values of the common material.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Own([Option<f64>; 5]);
 
@@ -39,7 +39,7 @@ impl Material {
         Self { stiffness_n_per_m, damping_ns_per_m, static_friction, kinetic_friction, viscous_ns_per_m }
     }
 
-    /// Returns this material with the own values of a group. Real-time: bounded, no allocation.
+    /// Returns this material with the values that a group overrides. Real-time: bounded, no allocation.
     pub(crate) fn with(self, own: &Own) -> Self {
         let all = [
             self.stiffness_n_per_m,
@@ -51,7 +51,7 @@ impl Material {
         Self::from_values(std::array::from_fn(|i| own.0[i].unwrap_or(all[i])))
     }
 
-    /// Returns the coefficient of a sliding ball. Real-time: bounded, no allocation.
+    /// Returns the coefficient of friction of a sliding ball. Real-time: bounded, no allocation.
     pub(crate) fn sliding(&self) -> f64 {
         self.kinetic_friction.min(self.static_friction)
     }

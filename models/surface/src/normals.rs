@@ -1,32 +1,32 @@
-//! Normals at corners, real edges, and tangents of the curves between corners.
+//! Normals at corners, sharp edges, and tangents of the curves between corners.
 //!
-//! Normals are weighted means of the normals of faces about a corner, with the weights of Max (1999, J. Graphics Tools 4(2), 1-6),
-//! which are exact on a sphere and on a cylinder. Only faces between two real edges are averaged. A plane much larger than
-//! its curved neighbours has its own normal up to its rim, so that planes stay planes; the strips of a cylinder are as large as their
-//! neighbours.
+//! Normals are weighted means of the normals of faces about a corner, with the weights of Max (1999, J. Graphics Tools 4(2),
+//! 1-6), which are exact on a sphere and on a cylinder. Only faces between two sharp edges are averaged. A flat region much
+//! larger than its curved neighbours has its own normal up to its border, so that planes stay planes; the strips of a cylinder
+//! are as large as their neighbours.
 
 use crate::patch::Frame;
 use crate::topology::Topology;
 use crate::weld::Mesh;
 use flotor_hal::{DVec3, math};
 
-/// Angle between two faces of one plane, rad: the rounding of binary32 on faces of a thousandth of the object.
+/// Largest angle between two faces of one plane, rad: rounding error of binary32 on faces of a thousandth of the object.
 const FLAT_RAD: f64 = 2.0e-5;
-/// Ratio of the area of a plane to that of a curved neighbour from which the plane is a flat region.
+/// Smallest ratio of the area of a plane to that of a curved neighbour for which the plane is a flat region.
 const FLAT_AREA: f64 = 6.0;
-/// Sine between two normals below which they give no direction of their intersection.
+/// Sine of the angle between two normals below which the direction of their intersection is not used.
 const CREASE: f64 = 0.1;
-/// Cosine between curve and chord below which the edge stays straight.
+/// Cosine of the angle between curve and chord below which the edge stays straight.
 const STEEP: f64 = 0.5;
 /// Displacement below which a curve is straight, relative to its chord.
 const STRAIGHT: f64 = 1.0e-9;
 
-/// Normals and real edges of a mesh.
+/// Normals and sharp edges of a mesh.
 #[derive(Clone, Debug)]
 pub struct Normals {
     /// Unit normal of each face at each of its corners.
     pub corners: Vec<[DVec3; 3]>,
-    /// True for each edge of each face where the surface has an edge.
+    /// True for each edge of each face that is sharp.
     pub sharp: Vec<[bool; 3]>,
 }
 
@@ -39,12 +39,12 @@ fn face_normals(mesh: &Mesh) -> Vec<DVec3> {
         .collect()
 }
 
-/// Returns the angle between two unit vectors, rad, exact for small ones.
+/// Returns the angle between two unit vectors, rad, accurate for small angles.
 fn angle_rad(a: DVec3, b: DVec3) -> f64 {
     math::atan2(a.cross(b).length(), a.dot(b))
 }
 
-/// Returns the representative of a set, halving the path to it.
+/// Returns the representative of a set (union-find with path halving).
 fn root(parent: &mut [u32], mut i: u32) -> u32 {
     while parent[i as usize] != i {
         parent[i as usize] = parent[parent[i as usize] as usize];
@@ -53,7 +53,8 @@ fn root(parent: &mut [u32], mut i: u32) -> u32 {
     i
 }
 
-/// Returns for each face the number of its plane, if the plane has several faces and is much larger than those over its edges.
+/// Returns for each face the number of its plane; `None` unless the plane has several faces and is much larger than the adjacent
+/// faces.
 #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
 fn flat_regions(mesh: &Mesh, topology: &Topology, faces: &[DVec3], sharp: &[[bool; 3]]) -> Vec<Option<u32>> {
     let count = faces.len();
@@ -95,7 +96,7 @@ fn flat_regions(mesh: &Mesh, topology: &Topology, faces: &[DVec3], sharp: &[[boo
 }
 
 impl Normals {
-    /// Computes real edges, above `edge_angle_rad`, and normals. Not real-time.
+    /// Computes sharp edges (angle above `edge_angle_rad`) and normals. Not real-time.
     #[must_use]
     pub fn new(mesh: &Mesh, topology: &Topology, edge_angle_rad: f64) -> Self {
         let faces = face_normals(mesh);
@@ -104,7 +105,7 @@ impl Normals {
             .map(|t| {
                 topology.neighbours[t].map(|edge| {
                     edge.get().is_some_and(|(other, _)| {
-                        // Near the limit the cosine rounds; the angle decides.
+                        // Near the limit the cosine is inaccurate: compare the angle.
                         faces[t].dot(faces[other]) < cosine + 1.0e-6
                             && angle_rad(faces[t], faces[other]) > edge_angle_rad
                     })
@@ -126,14 +127,14 @@ impl Normals {
         normals
     }
 
-    /// Collects the faces about a corner up to real edges, as faces with the number of this corner.
+    /// Collects the faces about a corner up to the next sharp edges; each face with the index of this corner.
     fn gather(&self, topology: &Topology, t: usize, corner: usize, sector: &mut Vec<(usize, usize)>) {
         let over = |t: usize, edge: usize| match self.sharp[t][edge] {
             true => None,
             false => topology.neighbours[t][edge].get(),
         };
         let mut start = (t, corner);
-        // Back over the edges that start at the corner, to the first face of the sector.
+        // Go back over the edges that start at the corner, to the first face of the sector.
         while let Some((other, edge)) = over(start.0, start.1) {
             start = (other, (edge + 1) % 3);
             if start == (t, corner) {
@@ -180,7 +181,7 @@ fn tangents_m(mesh: &Mesh, topology: &Topology, normals: &Normals, t: usize, edg
     let chord_m = p[next] - p[edge];
     let length_m = chord_m.length();
     let own = [normals.corners[t][edge], normals.corners[t][next]];
-    // The neighbour's edge runs the other way.
+    // The neighbour has the edge in the opposite direction.
     let other = match topology.neighbours[t][edge].get() {
         Some((t, edge)) if normals.sharp[t][edge] => {
             [normals.corners[t][(edge + 1) % 3], normals.corners[t][edge]]

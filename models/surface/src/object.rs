@@ -1,4 +1,4 @@
-//! From a file to a surface: unit, healing, and refusal of what cannot be felt safely.
+//! Conversion of a mesh file to a surface: unit, repair, and rejection of unsuitable meshes.
 
 use crate::check::{Crossings, crossings};
 use crate::files::{self, Problem};
@@ -13,7 +13,7 @@ use std::fmt;
 /// Unit of the coordinates of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// Guess from format and size.
+    /// Guessed from format and size.
     Auto,
     /// Metres.
     Metre,
@@ -23,36 +23,36 @@ pub enum Unit {
     Inch,
 }
 
-/// Choices for the reading of a file.
+/// Import options of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Unit of the coordinates.
     pub unit: Unit,
-    /// Factor on the size.
+    /// Scale factor of the size.
     pub scale: f64,
-    /// Angle between two faces above which their edge stays an edge, rad.
+    /// Angle between two faces above which their common edge is sharp, rad.
     pub edge_angle_rad: f64,
 }
 
-/// Surface of a file, with what was changed.
+/// Surface of a file, with the remarks of the import.
 #[derive(Clone, Debug, Default)]
 pub struct Object {
     /// Smooth surface.
     pub surface: Surface,
     /// Names of the groups.
     pub names: Vec<String>,
-    /// What was guessed or changed, one sentence each.
+    /// Guesses and repairs of the import, one sentence each.
     pub remarks: Vec<String>,
 }
 
-/// Reason why an object cannot be touched.
+/// Reason why a mesh is rejected.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Unfit {
     /// The file cannot be read.
     File(Problem),
-    /// The surface has only one side; place of the edge, m.
+    /// The surface is not orientable; position of the edge, m.
     OneSided(DVec3),
-    /// Nothing is left of the mesh.
+    /// No triangle of the mesh has an area.
     Empty,
     /// The object is too large for the workspace; its diagonal, m.
     TooLarge(f64),
@@ -60,7 +60,7 @@ pub enum Unfit {
 
 /// Largest diagonal of an object, m: one metre of workspace to each side.
 const LARGEST_M: f64 = 4.0;
-/// Size of a file's box above which its unit is millimetres: no object in metres that a hand touches is larger.
+/// Extent of a mesh above which its unit is guessed as millimetres: no object touched by hand is larger than this in metres.
 const METRES_UP_TO: f64 = 3.0;
 
 impl fmt::Display for Unfit {
@@ -69,14 +69,14 @@ impl fmt::Display for Unfit {
             Self::File(problem) => problem.fmt(f),
             Self::OneSided(at) => write!(
                 f,
-                "the surface has only one side, as a Moebius strip: its faces meet with opposite sides at ({:.6} {:.6} {:.6}) m; \
-                 cut the surface there, or remove the band",
+                "the surface is not orientable, like a Moebius strip: faces of opposite orientation meet at ({:.6} {:.6} {:.6}) m; \
+                 cut the surface there, or remove the strip",
                 at.x, at.y, at.z
             ),
             Self::Empty => f.write_str("no face of the mesh has an area; export the mesh again"),
             Self::TooLarge(size_m) => write!(
                 f,
-                "the object is {size_m:.3} m long, but at most {LARGEST_M} m can be touched; set `unit` or `scale`"
+                "the object is {size_m:.3} m large (diagonal), above the limit of {LARGEST_M} m; set `unit` or `scale`"
             ),
         }
     }
@@ -88,7 +88,7 @@ impl From<Problem> for Unfit {
     }
 }
 
-/// Reads an object from the bytes of a file named `name`. Not real-time.
+/// Builds an object from the bytes of a file named `name`. Not real-time.
 ///
 /// # Errors
 /// [`Unfit`] with the place and the remedy.
@@ -119,16 +119,16 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
             remarks.push(format!("{number} {what}"));
         }
     };
-    count(topology.turned, "faces turned to the side of the others");
-    count(topology.crowded_edges, "edges of three or more faces, joined by the body between two");
+    count(topology.turned, "faces reversed to the orientation of their neighbours");
+    count(topology.crowded_edges, "edges with three or more faces, assigned to the bodies between the faces");
     let open = topology.components.iter().filter(|component| !component.is_closed).count();
-    count(open, "open parts, touched from both sides");
+    count(open, "open parts, which can be touched from both sides");
     let normals = Normals::new(&mesh, &topology, reading.edge_angle_rad);
     let surface = Surface::new(&mesh, &topology, &normals);
     let Crossings { count, first_m } = crossings(&surface);
     if let Some(at) = first_m {
         remarks.push(format!(
-            "{count} pairs of faces run through each other, the first at ({:.6} {:.6} {:.6}) m: a ball may be held on the \
+            "{count} pairs of faces intersect, the first at ({:.6} {:.6} {:.6}) m: a ball may be held on the \
              wrong face there; repair the mesh",
             at.x, at.y, at.z
         ));
@@ -138,11 +138,11 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
 
 fn describe(welded: &Welded, remarks: &mut Vec<String>) {
     for (number, what) in [
-        (welded.collapsed, "faces removed because two corners are one point"),
-        (welded.doubled, "faces removed because they were there twice"),
+        (welded.collapsed, "faces removed because two of their corners coincide"),
+        (welded.doubled, "duplicate faces removed"),
         (welded.flipped, "faces without area removed"),
-        (welded.closed, "points of borders joined over gaps of rounding"),
-        (welded.unresolved, "points merged because binary32 does not resolve their edge"),
+        (welded.closed, "points of borders merged over gaps of rounding errors"),
+        (welded.unresolved, "points merged because their edge is too short for binary32"),
     ] {
         if number > 0 {
             remarks.push(format!("{number} {what}"));
@@ -150,7 +150,7 @@ fn describe(welded: &Welded, remarks: &mut Vec<String>) {
     }
 }
 
-/// Returns the length of a unit of the file, m, and a sentence about a guess.
+/// Returns the length of a unit of the file, m, and a remark if it is a guess.
 fn metres(points: &[[f64; 3]], of_format: Option<f64>, unit: Unit) -> (f64, Option<String>) {
     match unit {
         Unit::Metre => (1.0, None),
@@ -170,7 +170,7 @@ fn metres(points: &[[f64; 3]], of_format: Option<f64>, unit: Unit) -> (f64, Opti
             let size = (0..3).map(|axis| ends[1][axis] - ends[0][axis]).fold(0.0, f64::max);
             let (metres, word) = if size > METRES_UP_TO { (1.0e-3, "mm") } else { (1.0, "m") };
             let remark = format!(
-                "the file has no unit and is {size:.6} long: taken as {word}; set `unit` if this is wrong"
+                "the file has no unit and is {size:.6} large: the unit is assumed to be {word}; set `unit` if this is wrong"
             );
             (metres, Some(remark))
         }

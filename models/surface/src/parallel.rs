@@ -1,13 +1,13 @@
-//! Work on ranges of numbers in a thread for each processor; results in the order of the ranges. Not real-time.
+//! Parallel loops over index ranges, one thread for each processor. Not real-time.
 
 use std::ops::Range;
 use std::thread;
 
-/// Fewest numbers for which threads are worth their start.
+/// Minimum number of indices per thread: below, starting a thread costs more than it saves.
 const LEAST: usize = 20_000;
 
-/// Returns the results of `work` on consecutive ranges that cover `0..count`. The ranges depend on the number of processors, so a
-/// caller joins the results in a way that does not.
+/// Returns the results of `work` on consecutive ranges that cover `0..count`, in their order. The ranges depend on the number of
+/// processors; a caller must combine the results so that the outcome does not.
 pub(crate) fn on_ranges<T: Send>(count: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let threads = thread::available_parallelism().map_or(1, usize::from).min(count / LEAST).max(1);
     let part = count.div_ceil(threads);
@@ -25,7 +25,7 @@ pub(crate) fn on_ranges<T: Send>(count: usize, work: impl Fn(Range<usize>) -> T 
     })
 }
 
-/// Sets each value of a slice by its number.
+/// Sets each element of a slice from its index.
 pub(crate) fn fill<T: Send>(values: &mut [T], make: impl Fn(usize) -> T + Sync) {
     let threads = thread::available_parallelism().map_or(1, usize::from).min(values.len() / LEAST).max(1);
     let part = values.len().div_ceil(threads).max(1);

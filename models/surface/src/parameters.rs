@@ -15,22 +15,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::real("stiffness_n_per_m", "N/m", 0.0, 1.0e6, 1000.0, "Stiffness of the surface").live(),
     Parameter::real("damping_ns_per_m", "N s/m", 0.0, 1000.0, 0.0, "Damping along the normal, in contact")
         .live(),
-    Parameter::real(
-        "static_friction",
-        "1",
-        0.0,
-        10.0,
-        0.0,
-        "Coefficient of friction at which a resting ball slides",
-    )
-    .live(),
+    Parameter::real("static_friction", "1", 0.0, 10.0, 0.0, "Coefficient of static friction").live(),
     Parameter::real(
         "kinetic_friction",
         "1",
         0.0,
         10.0,
         0.0,
-        "Coefficient of friction of a sliding ball, at most the static one; that one if this is not set",
+        "Coefficient of kinetic friction, at most the static coefficient (default: the static coefficient)",
     )
     .live(),
     Parameter::real(
@@ -45,10 +37,15 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "file",
         BUILT_IN,
-        "Mesh file (STL, OBJ, PLY, GLB), or a built-in object 2 mm below home; a bumpy sphere if not set",
+        "Mesh file (STL, OBJ, PLY, GLB), or a built-in object, with its top 2 mm below home (default: bumpy-sphere)",
     ),
-    Parameter::choice("unit", UNITS, 0, "Unit of the file; auto: m up to a size of 3, else mm, and GLB in m"),
-    Parameter::real("scale", "1", 1.0e-6, 1.0e6, 1.0, "Factor on the size of the object"),
+    Parameter::choice(
+        "unit",
+        UNITS,
+        0,
+        "Unit of the coordinates in the file; auto: m for GLB and for objects up to a size of 3, else mm",
+    ),
+    Parameter::real("scale", "1", 1.0e-6, 1.0e6, 1.0, "Scale factor of the object"),
     Parameter::choice("tool", TOOLS, 0, "Tool; the pose is its centre, in the frame of the file"),
     Parameter::real("tool_radius_mm", "mm", 0.0, 100.0, 0.5, "Radius of the ball; 0 is a point"),
     Parameter::real(
@@ -57,7 +54,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         180.0,
         30.0,
-        "Angle between two faces above which their edge stays an edge; below it the surface is smooth",
+        "Angle between two faces above which their common edge is sharp; below, the surface is smooth there",
     ),
     Parameter::file(
         "materials",
@@ -66,7 +63,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// Returns the choices for reading the file.
+/// Returns the import options of the mesh file.
 pub(crate) fn reading(settings: &Settings<'_>) -> Reading {
     Reading {
         unit: settings.one_of("unit", [Unit::Auto, Unit::Metre, Unit::Millimetre, Unit::Inch]),

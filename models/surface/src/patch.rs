@@ -12,7 +12,7 @@
 use crate::tree::Disc;
 use flotor_hal::DVec3;
 
-/// Barycentric coordinates of a place in a triangle: not negative, sum 1.
+/// Barycentric coordinates in a triangle: not negative, sum 1.
 pub type Barycentric = [f64; 3];
 
 /// Displacement, m, as stored.
@@ -37,23 +37,23 @@ pub struct Patch {
     pub(crate) corners_m: [DVec3; 3],
     /// Displacements of the two inner points of each cubic edge from the straight edge, m.
     edges: [[Stored; 2]; 3],
-    /// Displacements of the inner points near each corner, m: of the edge from the corner, of the edge to the corner.
+    /// Displacements of the inner points near each corner, m: for the edge from the corner, and for the edge to the corner.
     inner: [[Stored; 2]; 3],
-    /// Largest distance from the flat triangle, m, or more; zero for a flat patch.
+    /// Upper bound of the distance from the flat triangle, m; zero for a flat patch.
     pub(crate) bulge_m: f32,
 }
 
-/// Point of a patch with its derivatives by the first two barycentric coordinates.
+/// Point of a patch with its derivatives with respect to the first two barycentric coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Jet {
     pub(crate) point_m: DVec3,
     pub(crate) first: [DVec3; 2],
 }
 
-/// Displacement below which an inner point is in the flat triangle, relative to the edges.
+/// Displacement of an inner point below which the patch is flat, relative to the edges.
 const FLAT: f64 = 1.0e-11;
 
-/// Returns a displacement as stored; the neighbour of an edge rounds the same number.
+/// Rounds a displacement to its stored form, identical on both sides of an edge.
 #[allow(clippy::cast_possible_truncation)] // seven digits of a displacement are far below its own error
 fn stored(v: DVec3) -> Stored {
     [v.x as f32, v.y as f32, v.z as f32]
@@ -63,12 +63,12 @@ fn vector(v: Stored) -> DVec3 {
     DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }
 
-/// Each coordinate with the two after it.
+/// Index of each coordinate, with the next two in cyclic order.
 const TURNS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
-/// Largest sum of two coordinates at the third corner, where the shares of the inner points have no limit.
+/// Sum of two coordinates up to which a point counts as the third corner, where the weights of the inner points have no limit.
 const AT_CORNER: f64 = 1.0e-12;
 
-/// Returns the shares of two coordinates in their sum; zero at the corner where both vanish.
+/// Returns two coordinates divided by their sum; zero at the corner where both vanish.
 #[inline(always)]
 fn shares(xj: f64, xk: f64) -> [f64; 2] {
     let sum = xj + xk;
@@ -101,7 +101,7 @@ fn beside_edge(frame: &Frame, from: usize) -> [DVec3; 2] {
     let far = far + (k[1] * mu[1] + both) / 3.0;
     let flat = (frame.corners_m[apex] - p) * 0.25;
     let rise = (first + last) * 0.5 - (p + q) * 0.5;
-    // Points of the elevated edge, displaced; the flat point cancels.
+    // Displacements of the degree-elevated edge; the flat part cancels.
     let start_rise = (first - (p * 2.0 + q) / 3.0) * 0.75;
     [start_rise + near * 0.25 - flat, rise + far * 0.25 - flat]
 }
@@ -119,10 +119,10 @@ impl Patch {
         let beside: [[DVec3; 2]; 3] = std::array::from_fn(|i| beside_edge(frame, i));
         let inner = std::array::from_fn(|i| {
             let before = (i + 2) % 3;
-            // A cubic boundary, elevated, contributes a quarter of its two points near the corner.
+            // Degree elevation of the cubic boundary: a quarter of its two points near the corner.
             let elevated = (vector(edges[i][0]) + vector(edges[before][1])) * 0.25;
             let size_m = chords_m[i].length() + chords_m[before].length();
-            // Rounding of a flat triangle is no curvature.
+            // Treat rounding errors of a flat triangle as zero curvature.
             let rise = |v: DVec3| if v.length() <= FLAT * size_m { [0.0; 3] } else { stored(v) };
             [rise(beside[i][0] - elevated), rise(beside[before][1] - elevated)]
         });
@@ -140,13 +140,13 @@ impl Patch {
         let most = |all: &[[Stored; 2]; 3]| {
             all.as_flattened().iter().map(|v| vector(*v).length()).fold(0.0, f64::max)
         };
-        // The sums of the weights are at most 3/4 and 4/9.
+        // The sums of the weights are at most 3/4 (edges) and 4/9 (inner points).
         let bulge_m = 0.75 * most(&edges) + 0.445 * most(&inner);
         let bulge_m = if bulge_m > 0.0 { (bulge_m as f32).next_up() } else { 0.0 };
         Self { corners_m, edges, inner, bulge_m }
     }
 
-    /// Length of [`Self::write`], bytes.
+    /// Length of the data of [`Self::write`], bytes.
     pub(crate) const BYTES: usize = 9 * 8 + 36 * 4 + 4;
 
     /// Appends the numbers of the patch.
@@ -183,14 +183,14 @@ impl Patch {
         self.bulge_m == 0.0
     }
 
-    /// Returns lower and upper corner of a box about the patch, m.
+    /// Returns the lower and upper corner of a bounding box, m.
     pub(crate) fn bounds_m(&self) -> [DVec3; 2] {
         let [p, q, r] = self.corners_m;
         let bulge = DVec3::splat(f64::from(self.bulge_m));
         [p.min(q).min(r) - bulge, p.max(q).max(r) + bulge]
     }
 
-    /// Returns a flat cylinder about the patch.
+    /// Returns a flat cylinder that contains the patch.
     pub(crate) fn disc(&self) -> Disc {
         let [p, q, r] = self.corners_m;
         let longest = [(p, q), (q, r), (r, p)].into_iter().fold((p, p), |longest, edge| {
@@ -203,7 +203,7 @@ impl Patch {
         let half_way_m = (longest.0 + longest.1) * 0.5;
         let (a, b) = (q - p, r - p);
         let normal = a.cross(b);
-        // The circle through the corners; of an obtuse triangle that over the longest edge is smaller.
+        // Use the circumscribed circle; for an obtuse triangle, the smaller circle over the longest edge.
         let centre_m = p
             + (normal.cross(a) * b.length_squared() + b.cross(normal) * a.length_squared())
                 / (2.0 * normal.length_squared());
@@ -248,8 +248,8 @@ impl Patch {
         }
     }
 
-    /// Returns the second derivatives `aa`, `ab`, `bb` along `d`, m^2 for a `d` in m; they have no limit at a corner and count as
-    /// those of its edges there. Real-time: bounded, no allocation.
+    /// Returns the second derivatives `aa`, `ab`, `bb` along `d`, m^2 for a `d` in m; at a corner, where they have no limit,
+    /// those of its edges are used. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn bend_along(&self, x: Barycentric, d: DVec3) -> [f64; 3] {
         // By pairs of coordinates: each with itself, and each with the next one.
@@ -278,20 +278,20 @@ impl Patch {
         ]
     }
 
-    /// Returns the outward unit normal at a place. Real-time: bounded, no allocation.
+    /// Returns the outward unit normal at barycentric coordinates. Real-time: bounded, no allocation.
     #[must_use]
     pub fn normal(&self, x: Barycentric) -> DVec3 {
         let Jet { first: [a, b], .. } = self.jet(x);
         a.cross(b).try_normalize().unwrap_or_else(|| self.flat_normal())
     }
 
-    /// Returns the point at a place, m. Real-time: bounded, no allocation.
+    /// Returns the point at barycentric coordinates, m. Real-time: bounded, no allocation.
     #[must_use]
     pub fn point_m(&self, x: Barycentric) -> DVec3 {
         self.jet(x).point_m
     }
 
-    /// Returns the unit normal of the flat triangle; zero for one without area. Real-time: bounded, no allocation.
+    /// Returns the unit normal of the flat triangle; zero for a triangle without area. Real-time: bounded, no allocation.
     #[must_use]
     pub fn flat_normal(&self) -> DVec3 {
         let [p, q, r] = self.corners_m;

@@ -10,7 +10,7 @@ pub(crate) struct Plane {
     pub(crate) least_m: f64,
 }
 
-/// Violation of a condition by rounding, m.
+/// Largest violation of a condition that counts as rounding error, m.
 const ROUNDING_M: f64 = 1.0e-13;
 
 /// Returns the multipliers of the conditions `subset`, held with equality, and the displacement nearest to `to_m`.

@@ -1,4 +1,4 @@
-//! Plugin of the surface: the contract.
+//! Implementation of the model contract for the surface.
 
 use crate::material::{self, Material, Own};
 use crate::object::Object;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 10.0;
-/// Largest mesh file, bytes: four times the largest that is read as triangles in binary.
+/// Maximum size of a mesh file, bytes: four times the largest binary STL file.
 const MOST_BYTES: u64 = 4 << 30;
 /// Number of live parameters, the values of the common material.
 const LIVE: usize = material::KEYS.len();
@@ -24,7 +24,7 @@ const DEFAULT: &str = "bumpy-sphere";
 
 const DETAILS: &[Detail] = &[
     Detail::number("depth_m", "m", "Distance between the centres of tool and proxy"),
-    Detail::number("contacts", "1", "Number of places at which the ball touches the surface"),
+    Detail::number("contacts", "1", "Number of contacts between ball and surface"),
     Detail::word("friction", choices!["free", "sticks", "slides"], "State of the friction"),
     Detail::number("contact_x_m", "m", "Point of the first contact, x"),
     Detail::number("contact_y_m", "m", "Point of the first contact, y"),
@@ -43,11 +43,11 @@ pub struct Touched {
     last: Option<Answer>,
     /// Ball of the drawing, which follows the drawn poses instead of the ticks.
     drawn_touch: Touch,
-    /// Created for the first picture.
+    /// Picture; created on the first request.
     drawn: Option<Shape>,
 }
 
-/// Reads the object of the settings.
+/// Loads the object named by the settings.
 fn object(settings: &Settings<'_>) -> Result<Arc<Object>, Refusal> {
     let reading = reading(settings);
     let name = settings.text("file").unwrap_or(DEFAULT);

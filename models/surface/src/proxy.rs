@@ -1,31 +1,31 @@
-//! Proxy: the ball that touches the surface and never enters it, between ticks.
+//! Proxy: the ball that touches the surface and never enters it.
 //!
 //! The centre `q` of the proxy is the point nearest to the centre `c` of the tool that the ball can reach without entering the
-//! surface (god-object of Zilles and Salisbury 1995; for a ball Ruspini, Kolarov and Khatib 1997). The energy is `k/2 |q - c|^2`, its
-//! gradient the force. With one contact `q` lies at a radius over the closest point of `c`, found by a walk from the last one; with
-//! several, in a groove, Newton's method on the tangent planes of up to four contacts finds it. A new position counts only if no
-//! other part of the surface lies in the ball there nor between the old centre and the new.
+//! surface (god-object of Zilles and Salisbury 1995; for a ball Ruspini, Kolarov and Khatib 1997). The energy is `k/2 |q - c|^2`,
+//! its gradient the force. With one contact `q` lies at a radius over the closest point of `c`, found by a walk from the last
+//! one; with several, in a groove, Newton's method on the tangent planes of up to four contacts finds it. A new position is
+//! accepted only if no other part of the surface lies inside the ball there, or between the old and the new centre.
 
 use crate::closest::Foot;
 use crate::planes::{Plane, project};
 use crate::surface::{Place, Surface};
 use flotor_hal::DVec3;
 
-/// Most contacts at once: three determine a position, a fourth takes the place of one of them.
+/// Maximum number of simultaneous contacts: three determine a position, a fourth can replace one of them.
 pub(crate) const MOST_CONTACTS: usize = 4;
-/// Depth of a foreign patch in the ball that is not yet a contact, m.
+/// Penetration of a patch up to which it is not a new contact, m.
 const TOLERANCE_M: f64 = 2.0e-10;
-/// Movement at which several contacts have settled, m.
+/// Length of a Newton step at which several contacts have converged, m.
 const SETTLED_M: f64 = 1.0e-12;
-/// Most Newton steps for several contacts.
+/// Maximum number of Newton steps for several contacts.
 const MOST_STEPS: usize = 40;
-/// Most attempts to reach a goal, with a new contact or half the way each.
+/// Maximum number of attempts to reach a goal; each adds a contact or halves the path.
 const MOST_ROUNDS: usize = 24;
-/// Part of the radius that the centre moves between two searches of the ball: nothing fits through.
+/// Maximum motion of the centre between two searches for contacts, as a fraction of the radius: no surface fits in between.
 const SAFE_SHARE: f64 = 0.9;
-/// Height of a lifted way from which the ways up and down are tested too, m.
+/// Height of a lifted path above which its ascent and descent are tested as well, m.
 const HIGH_M: f64 = 1.0e-6;
-/// Gap at which a contact ends, m.
+/// Gap above which a contact ends, m.
 const SKIN_M: f64 = 1.0e-7;
 
 /// Side of a surface on which the ball is.
@@ -36,7 +36,7 @@ pub(crate) enum Side {
     Front,
     /// Other side, of an open surface only.
     Back,
-    /// Not determined: at the rim of an open surface.
+    /// Not determined: at the border of an open surface.
     Rim,
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct Contact {
     pub(crate) side: Side,
 }
 
-/// Contacts of a ball, the first ones of the places in use.
+/// Contacts of a ball; the first `count` are in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Contacts {
     pub(crate) all: [Option<Contact>; MOST_CONTACTS],
@@ -76,7 +76,7 @@ impl Contacts {
         self.iter().next()
     }
 
-    /// Adds a contact; returns false if it is one already or there is no room.
+    /// Adds a contact; returns false if the contact exists already or the list is full.
     fn add(&mut self, contact: Contact) -> bool {
         let is_known = self.iter().any(|other| is_same(&other.place.foot, &contact.place.foot));
         match self.all.iter_mut().find(|place| place.is_none()) {
@@ -89,12 +89,13 @@ impl Contacts {
     }
 }
 
-/// Returns true for two feet at one point of one sheet.
+/// Returns true if two closest points coincide and have the same normal.
 fn is_same(a: &Foot, b: &Foot) -> bool {
     (a.point_m - b.point_m).length() < 1.0e-9 && a.normal.dot(b.normal) > 1.0 - 1.0e-9
 }
 
-/// Position of a centre over a place: direction from the surface to the centre, and height over the surface.
+/// Position of a centre relative to a point of the surface: direction from the surface to the centre, and height above the
+/// surface.
 #[derive(Clone, Copy, Debug)]
 struct Over {
     direction: DVec3,
@@ -110,16 +111,16 @@ pub(crate) struct Ball {
     pub(crate) contacts: Contacts,
 }
 
-/// Obstacle on the way of a ball.
+/// Obstacle on the path of a ball.
 enum Obstacle {
-    /// Patch in the ball at the end of the way.
+    /// Patch inside the ball at the end of the path.
     Inside(Contact),
-    /// Patch between the centres; where the centre meets it, m.
+    /// Patch between the centres, and the position of the centre at contact, m.
     Between(Contact, DVec3),
 }
 
 impl Ball {
-    /// Returns the direction and height of `x_m` over a place on a side.
+    /// Returns the direction and height of `x_m` above a point of the surface, on one side.
     fn over(&self, surface: &Surface, place: &Place, side: Side, x_m: DVec3) -> Over {
         let foot = &place.foot;
         let from_m = x_m - foot.point_m;
@@ -128,14 +129,14 @@ impl Ball {
         if is_inner {
             let direction = foot.normal * side.sign();
             let height_m = from_m.dot(direction);
-            // The direction between two points is exact far from the surface, the normal near it.
+            // The direction between the two points is accurate far from the surface, the normal near the surface.
             return match distance_m > 1.0e-6 && height_m > 0.0 {
                 true => Over { direction: from_m / distance_m, height_m: distance_m },
                 false => Over { direction, height_m },
             };
         }
         if distance_m < 1.0e-9 {
-            // In a groove each wall holds a point for itself.
+            // In a groove each wall is a separate contact of a point.
             let direction = foot.normal * side.sign();
             return Over { direction, height_m: from_m.dot(direction) };
         }
@@ -145,7 +146,7 @@ impl Ball {
         Over { direction: from_m * (sign / distance_m), height_m: sign * distance_m }
     }
 
-    /// Returns the side of an open surface on which the proxy is, seen from a place.
+    /// Returns the side of an open surface on which the proxy is, at a point of the surface.
     fn side(&self, surface: &Surface, place: &Place, before: Side) -> Side {
         if surface.is_closed(place) {
             return Side::Front;
@@ -158,7 +159,7 @@ impl Ball {
         if before == Side::Rim || is_clear { Side::of(height_m) } else { before }
     }
 
-    /// Returns the ball nearest to `goal_m` over its contacts; without contacts at the goal.
+    /// Returns the ball nearest to `goal_m` on its contacts; at the goal if it has none.
     fn target(&self, surface: &Surface, goal_m: DVec3) -> Self {
         match (self.contacts.count(), self.contacts.first()) {
             (1, Some(contact)) => self.over_one(surface, goal_m, contact),
@@ -167,7 +168,7 @@ impl Ball {
         }
     }
 
-    /// Returns the ball nearest to `goal_m` over its one contact; `None` if it has several or leaves this one.
+    /// Returns the ball nearest to `goal_m` on its only contact; `None` if it has several contacts or loses its contact.
     pub(crate) fn over_its_contact(&self, surface: &Surface, goal_m: DVec3) -> Option<Self> {
         let contact = self.contacts.first().filter(|_| self.contacts.count() == 1)?;
         Some(self.over_one(surface, goal_m, contact)).filter(|ball| ball.contacts.count() == 1)
@@ -214,23 +215,23 @@ impl Ball {
         }
         ball.contacts = left;
         match (ball.contacts.count(), ball.contacts.first()) {
-            // One contact is exact by a walk.
+            // For one contact the walk is exact.
             (1, Some(contact)) => self.over_one(surface, goal_m, contact),
             _ => ball,
         }
     }
 
-    /// Returns what lies between this ball and `next`, or in `next`.
+    /// Returns the obstacle between this ball and `next`, or inside `next`.
     fn obstacle(&self, surface: &Surface, next: &Self) -> Option<Obstacle> {
         let way_m = next.centre_m - self.centre_m;
         if way_m.length() > SAFE_SHARE * self.radius_m {
-            // In a groove the normal of one wall points into the other.
+            // In a groove the normal of one wall points into the other wall: use their sum.
             let normal = |ball: &Self| {
                 let up = |c: Contact| surface.outward(&c.place).normalize_or_zero() * c.side.sign();
                 ball.contacts.iter().map(up).sum::<DVec3>().normalize_or_zero()
             };
             let (here, there) = (normal(self), normal(next));
-            // Over a curved surface the chord runs through it: lift the way by more than its sagitta.
+            // The chord over a curved surface crosses the surface: lift the path by more than the sagitta.
             let lift_m = way_m.length() * ((here - there).length() * 0.25).min(0.25) + 1.0e-9;
             let (from_m, to_m) = (self.centre_m + here * lift_m, next.centre_m + there * lift_m);
             let skin = 1.0e-9;
@@ -256,7 +257,7 @@ impl Ball {
             !surface.is_closed(place)
                 || (next.centre_m - place.foot.point_m).dot(surface.outward(place)) > 0.0
         };
-        // What the ball touches is as far as its radius.
+        // Skip the patches in contact: their distance is the radius.
         let is_touched = |patch| next.contacts.iter().any(|contact| contact.place.patch == patch);
         let bound_m = self.radius_m - TOLERANCE_M;
         let place = surface.nearest_besides(next.centre_m, bound_m, is_touched, in_front)?;
@@ -265,7 +266,7 @@ impl Ball {
     }
 
     /// Moves the ball towards `goal_m` as far as the surface permits; returns false if the attempts are used up before the ball
-    /// is at rest, at a place that is free all the same. Real-time: bounded, no allocation.
+    /// is at rest (its position is free of obstacles in that case, too). Real-time: bounded, no allocation.
     pub(crate) fn settle(&mut self, surface: &Surface, goal_m: DVec3) -> bool {
         let (mut share, mut blocked) = (1.0, 0);
         for _ in 0..MOST_ROUNDS {
@@ -290,11 +291,11 @@ impl Ball {
             };
             let mut is_new = self.contacts.add(contact);
             if !is_new {
-                // A contact that touches nothing makes room.
+                // Remove contacts that the ball does not touch, to make room.
                 self.drop_idle(surface);
                 is_new = self.contacts.add(contact);
             }
-            // A new contact changes the way; if it does not, a shorter way does.
+            // If a new contact does not change the path, try a shorter one.
             blocked += 1;
             if !is_new || blocked > 2 {
                 share *= 0.5;
@@ -323,7 +324,7 @@ impl Ball {
         sum.try_normalize()
     }
 
-    /// Returns this ball over the surface under `near_m`, on its single contact whatever the side of `near_m`; with several contacts,
+    /// Returns this ball on the surface below `near_m`: with one contact, on the side of this contact; with several contacts,
     /// nearest to `near_m`.
     pub(crate) fn placed_under(&self, surface: &Surface, near_m: DVec3) -> Self {
         let Some(contact) = self.contacts.first().filter(|_| self.contacts.count() == 1) else {
@@ -336,7 +337,7 @@ impl Ball {
         Self { centre_m: place.foot.point_m + direction * self.radius_m, contacts, ..*self }
     }
 
-    /// Returns true if nothing lies in the ball `next` or between it and this one.
+    /// Returns true if there is no obstacle inside the ball `next` or between the two balls.
     pub(crate) fn can_move_to(&self, surface: &Surface, next: &Self) -> bool {
         self.obstacle(surface, next).is_none()
     }

@@ -1,4 +1,4 @@
-//! State of the touch for `flotor.snapshot/1`: what the next step depends on, beside the surface and the parameters.
+//! State of the touch for `flotor.snapshot/1`: all numbers that affect the next step, except the surface and the parameters.
 
 use crate::closest::Foot;
 use crate::plugin::Touched;
@@ -26,7 +26,7 @@ enum Phase {
 
 restorable!(Phase = Start | Overlapping | Outside);
 
-/// The same number of bytes in each state.
+/// Every state has the same number of bytes.
 impl Restorable for State {
     fn pass(&mut self, bytes: &mut StateBytes<'_>) {
         let (mut phase, mut place, mut ball) = match *self {
@@ -56,7 +56,7 @@ impl Restorable for Touched {
 }
 
 impl Touch {
-    /// Restores a state with the radius of this ball; resets the contact if the state is of another surface or not finite.
+    /// Validates a restored state: resets the contact if the state belongs to another surface or is not finite.
     fn begin_unless_on(&mut self, surface: &Surface) {
         let radius_m = self.radius_m;
         let is_on = match &mut self.state {

@@ -1,6 +1,6 @@
-//! Triangles as a file has them: points without units, faces without neighbours, groups by name.
+//! Triangle soup: the triangles of a file, without unit and without connectivity.
 
-/// Loose triangles of a file.
+/// Triangle soup of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Soup {
     /// Points in the unit of the file, finite.
@@ -11,17 +11,17 @@ pub struct Soup {
     pub groups: Vec<u16>,
     /// Names of the groups.
     pub names: Vec<String>,
-    /// Unit of the file, if its format says it: GLB is in metres.
+    /// Length of the unit of the file, m, if the format defines it (GLB: 1).
     pub metres: Option<f64>,
 }
 
-/// Largest number of triangles: twenty times the largest mesh of the tests, at 300 bytes each.
+/// Maximum number of triangles: twenty times the largest mesh of the tests; 300 bytes each.
 pub const MOST_TRIANGLES: usize = 20_000_000;
-/// Largest coordinate in the unit of the file, beyond any object that is touched.
+/// Maximum coordinate in the unit of the file, beyond any real object.
 pub const LARGEST: f64 = 1.0e9;
 
 impl Soup {
-    /// Returns the number of a group, adding it if it is new; the last number for more than 65 535 groups.
+    /// Returns the index of a group, and adds the group if it is new; groups beyond 65 535 share the last index.
     pub(crate) fn group(&mut self, name: &str) -> u16 {
         let found = self.names.iter().rposition(|other| other == name);
         let index = found.unwrap_or_else(|| {

@@ -1,4 +1,5 @@
-//! Objects in use, shared by all instances of a process: one copy for the loop, the viewer's picture, and a hot swap. Not real-time.
+//! Objects in use, shared by all instances of a process: the loop, the viewer's picture and a hot swap use the same copy. Not
+//! real-time.
 
 use crate::cache;
 use crate::files::Format;
@@ -7,18 +8,18 @@ use crate::soup::Soup;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-/// Objects in use by their key.
+/// Objects in use, by key.
 static IN_USE: Mutex<Vec<(String, Weak<Object>)>> = Mutex::new(Vec::new());
-/// Remarks that were printed.
+/// Remarks already printed.
 static PRINTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// Returns the object of a key, from another instance or by `build`; prints its remarks once in a process.
+/// Returns the object with a key, shared with another instance or built by `build`; prints its remarks once per process.
 fn shared(
     name: &str,
     key: String,
     build: impl FnOnce(&str) -> Result<Object, Unfit>,
 ) -> Result<Arc<Object>, Unfit> {
-    // Held while building: a second instance of the same object waits for the first.
+    // Locked while building: a second instance of the same object waits for the first.
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     in_use.retain(|(_, object)| object.strong_count() > 0);
     if let Some(object) =
@@ -38,15 +39,15 @@ fn shared(
 /// Returns the object of a built-in soup.
 ///
 /// # Errors
-/// [`Unfit`] for a size that cannot be touched.
+/// [`Unfit`] if the object is too large.
 pub(crate) fn of_soup(name: &str, soup: Soup, reading: &Reading) -> Result<Arc<Object>, Unfit> {
     shared(name, format!("{name} {reading:?}"), |_| object::build(soup, reading))
 }
 
-/// Returns the object of a file, perhaps from the cache.
+/// Returns the object of a file, from the cache if possible.
 ///
 /// # Errors
-/// [`Unfit`] for a file that is no mesh, or one that cannot be touched.
+/// [`Unfit`] if the file is not a mesh or the mesh is unsuitable.
 pub(crate) fn of_file(name: &str, bytes: Vec<u8>, reading: &Reading) -> Result<Arc<Object>, Unfit> {
     let format = Format::of(name, &bytes);
     let key = format!("{format:?} {} {:016x} {reading:?}", bytes.len(), cache::digest(0, &bytes));

@@ -9,7 +9,7 @@ use crate::tree::{Tree, hilbert_order};
 use crate::weld::Mesh;
 use flotor_hal::DVec3;
 
-/// Place on the surface: a patch, and the closest point of it.
+/// Point on the surface: a patch, and the closest point of this patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     /// Number of the patch.
@@ -23,9 +23,9 @@ pub struct Place {
 pub struct Crossing {
     /// Number of the patch.
     pub patch: usize,
-    /// Place in the patch.
+    /// Barycentric coordinates in the patch.
     pub at: Barycentric,
-    /// Share of the segment before the crossing, 0 to 1.
+    /// Fraction of the segment before the crossing, 0 to 1.
     pub share: f64,
 }
 
@@ -38,7 +38,7 @@ pub struct Trait {
     pub is_closed: bool,
 }
 
-/// Smooth surface of a mesh. Some 260 bytes for each triangle.
+/// Smooth surface of a mesh; about 260 bytes per triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     pub(crate) patches: Vec<Patch>,
@@ -47,15 +47,17 @@ pub struct Surface {
     tree: Tree,
 }
 
-/// Most patches that a walk crosses.
+/// Maximum number of patches that a walk crosses.
 const MOST_PATCHES: usize = 64;
-/// Travel, relative to an edge, up to which the last closest point is a better start than the one of the flat triangle.
+/// Largest travel, relative to an edge, for which the last closest point is a better start than the closest point of the flat
+/// triangle.
 const NEAR: f64 = 0.05;
-/// Most patches about a corner.
+/// Maximum number of patches about a corner.
 const MOST_FAN: usize = 4096;
-/// Decrease of a distance below which a neighbour is not nearer, relative.
+/// Smallest relative decrease of the distance for which a neighbour counts as nearer.
 const NEARER: f64 = 1.0e-14;
-/// Part of a patch's coordinates beyond its sides within which a crossing counts: segments between two patches meet one.
+/// Tolerance of the barycentric coordinates beyond the sides, so that a segment through an edge crosses at least one of its two
+/// patches.
 const BETWEEN: f64 = 1.0e-7;
 
 impl Surface {
@@ -117,7 +119,7 @@ impl Surface {
         self.neighbours[patch][edge].get()
     }
 
-    /// Returns lower and upper corner of the box about all corners, m.
+    /// Returns the lower and upper corner of the bounding box of all corners, m.
     #[must_use]
     pub fn box_m(&self) -> [DVec3; 2] {
         let corners = self.patches.iter().flat_map(|patch| patch.corners_m);
@@ -131,20 +133,20 @@ impl Surface {
             + self.tree.bytes()
     }
 
-    /// Returns true for a place on a closed body.
+    /// Returns true for a point on a closed body.
     #[inline]
     #[must_use]
     pub(crate) fn is_closed(&self, place: &Place) -> bool {
         self.traits[place.patch].is_closed
     }
 
-    /// Returns the number of the group of a place.
+    /// Returns the index of the group of a point.
     #[must_use]
     pub(crate) fn group(&self, place: &Place) -> u16 {
         self.traits[place.patch].group
     }
 
-    /// Returns true for a place on the rim of an open surface.
+    /// Returns true for a point on the border of an open surface.
     pub(crate) fn is_border(&self, place: &Place) -> bool {
         !self.is_closed(place)
             && (0..3).any(|i| {
@@ -152,20 +154,20 @@ impl Surface {
             })
     }
 
-    /// Returns the place at coordinates of a patch.
+    /// Returns the point at barycentric coordinates of a patch.
     pub(crate) fn place(&self, patch: usize, at: Barycentric) -> Place {
         let jet = self.patches[patch].jet(at);
         let normal = self.patches[patch].normal(at);
         Place { patch, foot: Foot { at, point_m: jet.point_m, normal, distance_m: 0.0 } }
     }
 
-    /// Finds the place nearest to `c_m` within `bound_m` that `is_wanted` accepts. Real-time: bounded, no allocation.
+    /// Finds the point nearest to `c_m` within `bound_m` that `is_wanted` accepts. Real-time: bounded, no allocation.
     #[must_use]
     pub fn nearest(&self, c_m: DVec3, bound_m: f64, is_wanted: impl Fn(&Place) -> bool) -> Option<Place> {
         self.nearest_besides(c_m, bound_m, |_| false, is_wanted)
     }
 
-    /// Finds the place that [`Self::nearest`] finds, on patches that `is_known` does not name.
+    /// Finds the nearest point as [`Self::nearest`], without the patches for which `is_known` returns true.
     pub(crate) fn nearest_besides(
         &self,
         c_m: DVec3,
@@ -197,12 +199,12 @@ impl Surface {
         best
     }
 
-    /// Visits the patches from number `first` on that may overlap a box.
+    /// Visits the patches with an index of at least `first` that may overlap a box.
     pub(crate) fn near_box(&self, [low_m, high_m]: [DVec3; 2], first: usize, visit: impl FnMut(usize)) {
         self.tree.along(low_m, high_m, first, visit);
     }
 
-    /// Follows the surface downhill to a local closest point to `c_m`, from `patch`. Real-time: bounded, no allocation.
+    /// Walks over neighbouring patches to a local closest point to `c_m`, starting at `patch`. Real-time: bounded, no allocation.
     #[must_use]
     pub fn walk(&self, c_m: DVec3, patch: usize) -> Place {
         let (patch, at) = self.flat_walk(c_m, patch);
@@ -218,8 +220,8 @@ impl Surface {
         place
     }
 
-    /// Follows the surface downhill to a local closest point to `c_m`, from the closest point of a place `travel_m` away. Real-time:
-    /// bounded, no allocation.
+    /// Walks over neighbouring patches to a local closest point to `c_m`, starting at the closest point `from` of a position
+    /// `travel_m` away. Real-time: bounded, no allocation.
     pub(crate) fn follow(&self, c_m: DVec3, from: &Place, travel_m: f64) -> Place {
         let [p, q, _] = self.patches[from.patch].corners_m;
         if travel_m < NEAR * p.distance(q) {
@@ -229,7 +231,8 @@ impl Surface {
         }
     }
 
-    /// Follows the flat triangles downhill, which takes a tenth of the time: the patch and the place from which a walk ends soon.
+    /// Walks over the flat triangles, ten times faster, and returns patch and coordinates as a start for the walk over the curved
+    /// patches.
     fn flat_walk(&self, c_m: DVec3, patch: usize) -> (usize, Barycentric) {
         let nearest = |number: usize| closest_of_triangle(&self.patches[number].corners_m, c_m);
         let (mut number, (mut flat, mut square)) = (patch, nearest(patch));
@@ -262,7 +265,7 @@ impl Surface {
         (number, flat)
     }
 
-    /// Returns the closest point of a neighbour over the side or the corner at which a walk arrived, if it is nearer.
+    /// Returns the closest point of a neighbour across the edge or the corner that a walk reached; `None` if it is not nearer.
     fn step_on(&self, c_m: DVec3, place: &Place) -> Option<Place> {
         let at = place.foot.at;
         let zeros = at.map(|x| x <= 0.0);
@@ -289,7 +292,7 @@ impl Surface {
         self.try_at(c_m, place, other, at)
     }
 
-    /// Leaves a corner between the two faces at the edge that points most towards `c_m`.
+    /// Continues a walk from a corner, in the two faces at the edge that points most directly towards `c_m`.
     fn about(&self, c_m: DVec3, place: &Place, corner: usize) -> Option<Place> {
         let to_m = c_m - place.foot.point_m;
         let mut best = (0.0, None);
@@ -317,7 +320,7 @@ impl Surface {
         }
     }
 
-    /// Visits the patches about a corner of a patch, each with the number of this corner.
+    /// Visits the patches about a corner of a patch, each with its index of this corner.
     fn fan(&self, patch: usize, corner: usize, mut visit: impl FnMut(usize, usize)) {
         visit(patch, corner);
         let mut at = (patch, corner);
@@ -329,7 +332,7 @@ impl Surface {
             }
             visit(at.0, at.1);
         }
-        // A border: the rest lies the other way.
+        // At a border, visit the remaining patches in the other direction.
         let mut at = (patch, corner);
         for _ in 0..MOST_FAN {
             let Some((other, edge)) = self.neighbours[at.0][at.1].get() else { return };
@@ -341,7 +344,7 @@ impl Surface {
         }
     }
 
-    /// Returns a direction towards the outside at a place, also on an edge or at a corner; not normalised. Real-time: bounded, no
+    /// Returns an outward direction at a point, also on an edge or at a corner; not normalised. Real-time: bounded, no
     /// allocation.
     #[must_use]
     pub fn outward(&self, place: &Place) -> DVec3 {
@@ -372,7 +375,7 @@ impl Surface {
         }
     }
 
-    /// Finds the first crossing of a segment with the surface, against the outside of closed bodies. Real-time: bounded, no
+    /// Finds the first crossing of a segment with the surface; closed bodies count only from outside. Real-time: bounded, no
     /// allocation.
     #[must_use]
     pub fn first_crossing(&self, from_m: DVec3, to_m: DVec3) -> Option<Crossing> {
@@ -395,12 +398,13 @@ impl Patch {
         self.corner_tangent(corner, corner)
     }
 
-    /// Returns the derivative of the edge that ends at a corner, taken backwards, m.
+    /// Returns the derivative of the edge that ends at a corner, in the reverse direction, m.
     pub(crate) fn arriving(&self, corner: usize) -> DVec3 {
         self.corner_tangent(corner, (corner + 2) % 3)
     }
 
-    /// Finds where a segment meets the patch, with the share of the segment; Newton's method from the flat triangle.
+    /// Finds the crossing of a segment with the patch, and the fraction of the segment before it (Newton's method, from the flat
+    /// triangle).
     fn crossing(&self, from_m: DVec3, way_m: DVec3) -> Option<(Barycentric, f64)> {
         let [p, q, r] = self.corners_m;
         let inside = |at: &Barycentric, slack: f64| at.iter().all(|x| *x >= -slack);
@@ -427,7 +431,7 @@ impl Patch {
         if self.is_flat() {
             return (inside(&at, BETWEEN) && (0.0..=1.0).contains(&share)).then_some((at, share));
         }
-        // A curved patch is crossed near its triangle or not at all.
+        // A crossing of a curved patch is near its flat triangle.
         if !inside(&at, 1.0) {
             return None;
         }

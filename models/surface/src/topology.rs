@@ -1,4 +1,4 @@
-//! Neighbours, sides and closed bodies of a mesh.
+//! Connectivity of a mesh: neighbours, orientation and closed bodies.
 
 use crate::weld::{Mesh, Numbers, mix};
 use flotor_hal::{DVec3, math};
@@ -20,12 +20,12 @@ impl EdgeRef {
         Self((3 * triangle + edge) as u32)
     }
 
-    /// Returns the number that [`Self::from_code`] takes.
+    /// Returns the code for [`Self::from_code`].
     pub(crate) fn code(self) -> u32 {
         self.0
     }
 
-    /// Builds a reference from the number of another.
+    /// Builds the reference with a code.
     pub(crate) fn from_code(code: u32) -> Self {
         Self(code)
     }
@@ -43,9 +43,9 @@ impl EdgeRef {
 pub struct Component {
     /// True if the part encloses a body.
     pub is_closed: bool,
-    /// Enclosed volume with its sign, m³.
+    /// Enclosed signed volume, m³.
     pub volume_m3: f64,
-    /// A corner of the part, m.
+    /// Position of a corner of the part, m.
     pub place_m: DVec3,
 }
 
@@ -58,21 +58,21 @@ pub struct Topology {
     pub component: Vec<u32>,
     /// Components.
     pub components: Vec<Component>,
-    /// Edges of three or more faces.
+    /// Number of edges with three or more faces.
     pub crowded_edges: usize,
-    /// Triangles turned round.
+    /// Number of triangles with reversed orientation.
     pub turned: usize,
 }
 
-/// Mesh whose sides cannot be made consistent, with the middle of the edge where they meet, m.
+/// Error: mesh without a consistent orientation, with the midpoint of an edge where orientations conflict, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneSided(pub DVec3);
 
-/// Angle between two faces below which they lie on each other, rad.
+/// Angle between two faces below which the faces coincide, rad.
 const FOLDED_RAD: f64 = 1.0e-6;
 
-/// Pairs the edges of two faces each, and those of more faces by the body between them. Returns the neighbours and the number of edges
-/// of more faces.
+/// Pairs the faces at each edge; at an edge with more than two faces, the faces of the same body. Returns the neighbours and the
+/// number of edges with more than two faces.
 #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 edges
 fn pair_edges(mesh: &Mesh) -> (Vec<[EdgeRef; 3]>, usize) {
     let triangles = &mesh.triangles;
@@ -115,9 +115,9 @@ fn pair_edges(mesh: &Mesh) -> (Vec<[EdgeRef; 3]>, usize) {
     (neighbours, crowded.len())
 }
 
-/// Pairs the faces about an edge of several: those with a body between them, the smallest angles first.
+/// Pairs the faces about an edge with more than two faces: faces with a body between them, the smallest angles first.
 fn bodies_about(mesh: &Mesh, all: &[u32]) -> Vec<(u32, u32)> {
-    // Direction of each face away from the edge, and whether the face runs along the edge or against it.
+    // Direction of each face away from the edge, and true if the face has the edge in its direction.
     let corners = |number: u32| {
         let (p, e) = (mesh.corners_m(number as usize / 3), number as usize % 3);
         (p[e], p[(e + 1) % 3], p[(e + 2) % 3])
@@ -133,7 +133,7 @@ fn bodies_about(mesh: &Mesh, all: &[u32]) -> Vec<(u32, u32)> {
     let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
     for (one, _, d) in faces.iter().filter(|face| face.1) {
         for (other, _, e) in faces.iter().filter(|face| !face.1) {
-            // The body of a face along the edge lies clockwise of it; two faces on each other enclose none.
+            // The body lies clockwise of a face in the direction of the edge; coincident faces enclose no body.
             let angle_rad = math::atan2(e.cross(*d).dot(along), e.dot(*d));
             let angle_rad =
                 if angle_rad < FOLDED_RAD { angle_rad + std::f64::consts::TAU } else { angle_rad };
@@ -150,8 +150,8 @@ fn bodies_about(mesh: &Mesh, all: &[u32]) -> Vec<(u32, u32)> {
     chosen
 }
 
-/// Finds neighbours, makes sides consistent, and turns closed bodies to the outside; a body inside another one, a hole, has the
-/// side of the file. Not real-time.
+/// Finds neighbours and makes the orientation consistent, outward for closed bodies; a body inside another one (a cavity) keeps
+/// the orientation of the file. Not real-time.
 ///
 /// # Errors
 /// [`OneSided`] for a surface like a Moebius strip.
@@ -176,7 +176,7 @@ pub fn connect(mesh: &mut Mesh) -> Result<Topology, OneSided> {
             next += 1;
             for e in 0..3 {
                 let Some((other, edge)) = topology.neighbours[t][e].get() else { continue };
-                // Two faces of one side run through their edge in opposite directions.
+                // Faces of equal orientation have their common edge in opposite directions.
                 let same_way = mesh.triangles[t][e] == mesh.triangles[other][edge];
                 let turned = is_turned[t] != same_way;
                 if topology.component[other] == u32::MAX {
@@ -199,7 +199,7 @@ impl Topology {
     fn finish(&mut self, mesh: &mut Mesh, is_turned: &[bool], members: &[Vec<u32>]) {
         let mut turned: Vec<bool> = is_turned.to_vec();
         for found in members {
-            // The side of most faces is the right one.
+            // Keep the orientation of the majority of the faces.
             let count = found.iter().filter(|t| is_turned[**t as usize]).count();
             let mostly = 2 * count > found.len();
             let is_closed = self.is_closed(mesh, found);
@@ -228,7 +228,7 @@ impl Topology {
         self.turn(mesh, &turned);
     }
 
-    /// Turns triangles round; edge 0 has the same place, the other two swap.
+    /// Reverses the orientation of triangles; edge 0 stays, the other two swap.
     fn turn(&mut self, mesh: &mut Mesh, turned: &[bool]) {
         self.turned = turned.iter().filter(|t| **t).count();
         if self.turned == 0 {
@@ -254,7 +254,7 @@ impl Topology {
         }
     }
 
-    /// Returns true if each edge of these faces has as many faces of one direction as of the other.
+    /// Returns true if each edge of these faces has equally many faces in both directions.
     fn is_closed(&self, mesh: &Mesh, found: &[u32]) -> bool {
         let open: Vec<(u32, u32)> = found
             .iter()
@@ -270,7 +270,7 @@ impl Topology {
         edges.chunk_by(|a, b| a == b).all(|chunk| chunk.len() % 2 == 0)
     }
 
-    /// Returns true if a component lies inside another closed one: a ray upwards crosses it an odd number of times.
+    /// Returns true if a component lies inside another closed one: an upward ray crosses the other one an odd number of times.
     fn is_inside_another(&self, mesh: &Mesh, members: &[Vec<u32>], number: usize) -> bool {
         let from = self.components[number].place_m;
         (0..members.len()).filter(|&other| other != number && self.components[other].is_closed).any(|other| {
@@ -281,7 +281,7 @@ impl Topology {
     }
 }
 
-/// Returns true if a vertical ray from `from` upwards meets a triangle; each point of a mesh's shadow belongs to one triangle.
+/// Returns true if a vertical ray from `from` upwards meets a triangle; a point on a common edge counts for one triangle only.
 fn is_above([p, q, r]: [DVec3; 3], from: DVec3) -> bool {
     let edge = |a: DVec3, b: DVec3| (b.x - a.x) * (from.y - a.y) - (b.y - a.y) * (from.x - a.x);
     let (u, v, w) = (edge(q, r), edge(r, p), edge(p, q));

@@ -1,8 +1,8 @@
-//! Touch of a ball that moves through space: home rule, path of a tick, friction.
+//! Contact of the tool with the surface: start rule, path in a tick, friction.
 //!
-//! A tool whose ball overlaps the surface at the start, or lies in a closed body, feels nothing until the whole ball has been
-//! outside once. Friction is Coulomb's, on the proxy: it rests while the force along the surface is at most `static_friction` times
-//! the normal force, else it slides towards the frictionless place until that force is `kinetic_friction` times the normal force, and
+//! A ball that overlaps the surface at the start, or lies in a closed body, has no contact until it has been entirely outside
+//! once. Friction is Coulomb's, on the proxy: it rests while the force along the surface is at most `static_friction` times the
+//! normal force, else it slides towards the frictionless place until that force is `kinetic_friction` times the normal force, and
 //! slides on at this coefficient until a tick in which it need not move. A slide shortens `|q - c|`, so friction only dissipates.
 
 use crate::material::{Material, Own};
@@ -13,24 +13,24 @@ use flotor_hal::DVec3;
 /// State of the friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Friction {
-    /// No contact, or none with friction.
+    /// No contact, or no friction.
     #[default]
     Free = 0,
-    /// The proxy rests.
+    /// The proxy sticks.
     Sticks = 1,
     /// The proxy slides.
     Slides = 2,
 }
 
-/// State of the touch.
+/// State of the contact.
 #[allow(clippy::large_enum_variant)] // one state an instance, in a tick without allocation
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum State {
     /// No step yet.
     Start,
-    /// Overlapping since the start; distance to the surface in the last step, m.
+    /// Overlap since the start; position of the tool and its distance from the surface in the last step, m.
     Overlapping { tool_m: DVec3, distance_m: f64 },
-    /// Outside, perhaps in contact.
+    /// Outside, with or without contact.
     Outside { ball: Ball, tool_m: DVec3 },
 }
 
@@ -41,7 +41,7 @@ pub struct Answer {
     pub force_n: DVec3,
     /// Energy of the spring, J.
     pub energy_j: f64,
-    /// Distance of the tool's centre from that of the proxy, m.
+    /// Distance between the centres of tool and proxy, m.
     pub depth_m: f64,
     /// Point of the first contact, m, and the direction from the surface to the ball; `None` without contact.
     pub contact: Option<(DVec3, DVec3)>,
@@ -49,9 +49,9 @@ pub struct Answer {
     pub contacts: usize,
     /// State of the friction.
     pub friction: Friction,
-    /// True while a tool that started in the surface has not been outside.
+    /// True while a tool that started inside the surface has not been outside.
     pub is_overlapping: bool,
-    /// True if the proxy is at rest.
+    /// True if the proxy has reached its position in this tick.
     pub is_settled: bool,
 }
 
@@ -68,18 +68,19 @@ impl Answer {
     };
 }
 
-/// Longest way of the tool in one search for balls below it, m: a finer way gives nothing for a point.
+/// Maximum travel of a point in one step of its path, m: finer steps do not improve a point contact. A larger ball travels at
+/// most 0.9 of its radius.
 const POINT_STEP_M: f64 = 2.0e-3;
-/// Shortest way into which a tick is divided, m.
+/// Radius below which a ball counts as a point, m.
 const LEAST_STEP_M: f64 = 5.0e-5;
-/// Most parts of a tick.
+/// Maximum number of steps of the path in a tick.
 const MOST_PARTS: f64 = 64.0;
-/// Most steps of the search for the border of the cone.
+/// Maximum number of steps of the search for the boundary of the friction cone.
 const MOST_SECANTS: usize = 40;
-/// Distance from the border of the cone at which the search ends, m.
+/// Distance from the boundary of the friction cone at which the search ends, m.
 const ON_CONE_M: f64 = 1.0e-14;
 
-/// Ball in the hand, and the surface it touches.
+/// Tool ball and the state of its contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
     pub(crate) radius_m: f64,
@@ -92,7 +93,7 @@ pub struct Touch {
 pub struct Materials {
     /// Material of groups without values of their own.
     pub common: Material,
-    /// Own values of each group.
+    /// Values that each group overrides.
     pub own: Vec<Own>,
 }
 
@@ -105,18 +106,19 @@ impl Materials {
 }
 
 impl Touch {
-    /// Places a ball of radius `radius_m` nowhere yet. Not real-time.
+    /// Creates a ball of radius `radius_m`, without a position. Not real-time.
     #[must_use]
     pub fn new(radius_m: f64) -> Self {
         Self { radius_m, state: State::Start, friction: Friction::Free }
     }
 
-    /// Forgets all steps. Real-time: bounded, no allocation.
+    /// Resets to the state before the first step. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         *self = Self::new(self.radius_m);
     }
 
-    /// Returns true if the whole ball at `tool_m` is outside, and the distance of its centre from the surface, at most `bound_m`.
+    /// Returns true if the ball at `tool_m` is entirely outside, and the distance of its centre from the surface, at most
+    /// `bound_m`.
     fn clearance(&self, surface: &Surface, tool_m: DVec3, bound_m: f64) -> (bool, f64) {
         let Some(place) = surface.nearest(tool_m, bound_m, |_| true) else { return (true, bound_m) };
         let is_outside =
@@ -124,7 +126,7 @@ impl Touch {
         (is_outside && place.foot.distance_m >= self.radius_m, place.foot.distance_m)
     }
 
-    /// Moves the tool to `tool_m` with `velocity_m_per_s` and returns what the hand feels. Real-time: bounded, no allocation.
+    /// Moves the tool to `tool_m` with `velocity_m_per_s` and returns force and contact. Real-time: bounded, no allocation.
     pub fn step(
         &mut self,
         surface: &Surface,
@@ -136,7 +138,7 @@ impl Touch {
             State::Outside { ball, tool_m } => (ball, tool_m),
             State::Start | State::Overlapping { .. } => {
                 let bound_m = match self.state {
-                    // The nearest point of the last step bounds the search, with a margin for rounding.
+                    // The distance in the last step bounds the search, with a margin for rounding.
                     State::Overlapping { tool_m: last_m, distance_m } => {
                         (distance_m + (tool_m - last_m).length()) * (1.0 + 1.0e-9) + 1.0e-9
                     }
@@ -197,7 +199,7 @@ impl Touch {
         }
         self.friction = Friction::Slides;
         if let Some(edge) = at_cone(surface, &before, ball, goal_m, material.sliding()) {
-            // Between the two places the ball slides over what it touches; anything else is met by the frictionless ball.
+            // Slide along the contacts if the path is free; otherwise the frictionless ball meets the obstacle.
             if before.can_move_to(surface, &edge) {
                 *ball = edge;
             }
@@ -215,7 +217,7 @@ impl Touch {
     ) -> Answer {
         let stretch_m = ball.centre_m - tool_m;
         let Some(contact) = ball.contacts.first() else { return Answer::NOTHING };
-        // Without friction the spring pulls along the normal of all contacts.
+        // Without friction the spring force is along the normal of all contacts.
         let is_along = material.static_friction == 0.0 || ball.contacts.count() > 1;
         let along = is_along.then(|| stretch_m.try_normalize()).flatten();
         let Some(normal) = along.or_else(|| ball.normal(surface)) else { return Answer::NOTHING };
@@ -238,7 +240,7 @@ impl Touch {
         }
     }
 
-    /// Returns the centre of the proxy while it touches, m.
+    /// Returns the centre of the proxy in contact, m; `None` without contact.
     #[must_use]
     pub fn proxy_m(&self) -> Option<DVec3> {
         match self.state {
@@ -248,8 +250,8 @@ impl Touch {
     }
 }
 
-/// Returns by how much a stretch along the surface exceeds `coefficient` times its part along the normal, m; not positive for a ball
-/// that rests. A stretch that does not press counts as free.
+/// Returns the excess of the tangential stretch over `coefficient` times the normal stretch, m; not positive for a ball that
+/// sticks. A stretch without pressure counts as free.
 fn excess_m(stretch_m: DVec3, normal: DVec3, coefficient: f64) -> f64 {
     let depth_m = stretch_m.dot(normal);
     if depth_m <= 0.0 {
@@ -259,8 +261,8 @@ fn excess_m(stretch_m: DVec3, normal: DVec3, coefficient: f64) -> f64 {
 }
 
 impl Ball {
-    /// Returns this ball, slid over its one contact towards a tool at `goal_m` as far as friction permits; `None` if that is not all
-    /// that happens: another contact, the end of this one, or something on the way.
+    /// Returns this ball after sliding on its only contact towards a tool at `goal_m` as far as friction permits; `None` for
+    /// another contact, the end of this contact, or an obstacle.
     fn slid_on(&self, surface: &Surface, goal_m: DVec3, coefficient: f64) -> Option<Self> {
         let free = self.over_its_contact(surface, goal_m)?;
         let edge = at_cone(surface, self, &free, goal_m, coefficient)?;
@@ -268,8 +270,8 @@ impl Ball {
     }
 }
 
-/// Returns the ball between a frictionless place and the place `before` at which the force along the surface is on the cone;
-/// `None` if even the frictionless place is.
+/// Returns the ball between its frictionless position `free` and its position `before` with the force on the friction cone;
+/// `None` if the force at the frictionless position is outside the cone.
 fn at_cone(surface: &Surface, before: &Ball, free: &Ball, goal_m: DVec3, coefficient: f64) -> Option<Ball> {
     let excess = |ball: &Ball| Some(excess_m(ball.centre_m - goal_m, ball.normal(surface)?, coefficient));
     let (mut low, mut high) = (0.0, 1.0);
@@ -285,7 +287,7 @@ fn at_cone(surface: &Surface, before: &Ball, free: &Ball, goal_m: DVec3, coeffic
         return Some(ball);
     }
     high_m = high_m.min(way_m);
-    // Regula falsi; an end that stays twice counts half (Dowell and Jarratt 1971, BIT 11, 168-174).
+    // Regula falsi, Illinois variant (Dowell and Jarratt 1971, BIT 11, 168-174).
     let (mut best, mut last) = (*free, 0);
     for _ in 0..MOST_SECANTS {
         let share = (low * high_m - high * low_m) / (high_m - low_m);

@@ -1,16 +1,16 @@
-//! From loose triangles to an indexed mesh: equal points merged, faces without area removed, gaps of rounding closed.
+//! Conversion of a triangle soup to an indexed mesh: merges equal points, removes degenerate faces, closes gaps of rounding.
 
 use crate::soup::Soup;
 use flotor_hal::DVec3;
 use std::collections::BTreeMap;
 
-/// Distance below which two points of open borders are one, relative to the diagonal of the box.
+/// Distance below which two points of open borders are merged, relative to the diagonal of the bounding box.
 const GAP: f64 = 1.0e-6;
-/// Height of a triangle below which the triangle has no area, relative to the diagonal of the box: the rounding of binary32.
+/// Height below which a triangle is degenerate, relative to the diagonal of the bounding box: rounding error of binary32.
 const SLIVER: f64 = 1.0e-9;
-/// Shortest edge whose direction is known to a thousandth, relative to the rounding of a coordinate.
+/// Length of the shortest edge with a direction accurate to a thousandth, relative to the rounding error of a coordinate.
 const RESOLVED: f64 = 1000.0;
-/// Most passes over slivers: a chain of them needs one each.
+/// Maximum number of passes over slivers: each pass removes one of a chain.
 const MOST_PASSES: usize = 16;
 
 /// Indexed triangles.
@@ -24,22 +24,22 @@ pub struct Mesh {
     pub groups: Vec<u16>,
 }
 
-/// Numbers of what was changed.
+/// Numbers of changed faces and points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Welded {
     /// Faces removed because two corners are one point.
     pub collapsed: usize,
     /// Faces without area removed by a flip of their longest edge.
     pub flipped: usize,
-    /// Faces that were in the file twice with the same side.
+    /// Duplicate faces of equal orientation that were removed.
     pub doubled: usize,
-    /// Points of borders merged over a gap of rounding.
+    /// Points of borders merged over gaps of rounding.
     pub closed: usize,
-    /// Points merged because the rounding of binary32 hides the direction of their edge.
+    /// Points merged because their edge is too short for a reliable direction in binary32.
     pub unresolved: usize,
 }
 
-/// Open-addressed table from keys to numbers: a hash map of the standard library takes five times as long on a million points.
+/// Hash table from keys to indices, with open addressing: five times faster than the standard library's map on a million points.
 pub(crate) struct Numbers {
     slots: Vec<u32>,
     mask: usize,
@@ -79,7 +79,7 @@ pub(crate) fn mix(words: &[u64]) -> u64 {
     })
 }
 
-/// Returns the diagonal of the box of some points, m.
+/// Returns the diagonal of the bounding box of points, m.
 pub(crate) fn diagonal_m(points_m: &[DVec3]) -> f64 {
     let bounds = points_m.iter().fold(None, |bounds: Option<(DVec3, DVec3)>, p| {
         Some(bounds.map_or((*p, *p), |(low, high)| (low.min(*p), high.max(*p))))
@@ -87,7 +87,7 @@ pub(crate) fn diagonal_m(points_m: &[DVec3]) -> f64 {
     bounds.map_or(0.0, |(low, high)| (high - low).length())
 }
 
-/// Merges equal points of a soup, scaled by `metres`, and removes what has no area. Not real-time.
+/// Merges equal points of a soup, scaled by `metres`, and removes degenerate faces. Not real-time.
 #[must_use]
 #[allow(clippy::cast_possible_truncation)] // a soup has fewer than 2^32 points
 pub fn weld(soup: Soup, metres: f64) -> (Mesh, Welded) {
@@ -96,7 +96,7 @@ pub fn weld(soup: Soup, metres: f64) -> (Mesh, Welded) {
     let mut numbers = Numbers::new(soup.points.len());
     let mut new_number = Vec::with_capacity(soup.points.len());
     for point in &soup.points {
-        // Zero has two signs.
+        // Adding zero turns -0.0 into 0.0.
         let p = DVec3::from_array(*point) * metres + DVec3::ZERO;
         let hash = mix(&p.to_array().map(f64::to_bits));
         let next = points_m.len() as u32;
@@ -123,7 +123,7 @@ pub fn weld(soup: Soup, metres: f64) -> (Mesh, Welded) {
     (mesh, welded)
 }
 
-/// Returns the rounding of the coordinates if all are numbers of binary32; zero for finer ones.
+/// Returns the rounding error of the coordinates if all are binary32 numbers; zero for more precise coordinates.
 #[allow(clippy::cast_possible_truncation)] // the question
 fn rounding(points: &[[f64; 3]]) -> f64 {
     let largest = points.as_flattened().iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -161,7 +161,7 @@ impl Mesh {
         self.retain(|_, t| !is_collapsed(t))
     }
 
-    /// Removes faces with the same corners and the same side as an earlier face.
+    /// Removes faces with the same corners and orientation as an earlier face.
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
     fn remove_doubled(&mut self) -> usize {
         let turned = |t: [u32; 3]| {
@@ -180,7 +180,7 @@ impl Mesh {
         self.retain(|i, _| is_first[i])
     }
 
-    /// Returns the ends of the edges of only one face.
+    /// Returns the points of the borders: ends of edges with a single face.
     fn border(&self) -> Vec<u32> {
         let mut edges = Vec::with_capacity(3 * self.triangles.len());
         for t in &self.triangles {
@@ -200,7 +200,7 @@ impl Mesh {
         ends
     }
 
-    /// Merges points of borders that are nearer to each other than rounding.
+    /// Merges border points that are closer to each other than [`GAP`].
     fn close_gaps(&mut self) -> usize {
         let ends = self.border();
         let gap_m = GAP * diagonal_m(&self.points_m);
@@ -233,7 +233,8 @@ impl Mesh {
         merged.len()
     }
 
-    /// Merges the ends of edges shorter than `least_m`; removes faces that this folds onto each other. Returns the number of points.
+    /// Merges the ends of edges shorter than `least_m`, and removes faces that become coincident. Returns the number of merged
+    /// points.
     fn merge_unresolved(&mut self, least_m: f64) -> usize {
         let mut merged = 0;
         for _ in 0..MOST_PASSES {
@@ -263,7 +264,7 @@ impl Mesh {
         merged
     }
 
-    /// Removes pairs of faces with the same corners and opposite sides, at a point of `at`: a fold without inside.
+    /// Removes pairs of coincident faces of opposite orientation at the points marked in `at`.
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
     fn remove_folded(&mut self, at: &[bool]) {
         let sorted = |mut t: [u32; 3]| {
@@ -286,7 +287,7 @@ impl Mesh {
         self.retain(|i, _| !is_folded[i]);
     }
 
-    /// Removes triangles without area: the neighbour over the longest edge is split at the middle corner instead.
+    /// Removes degenerate triangles: splits the neighbour over the longest edge at the middle corner.
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
     fn flip_slivers(&mut self) -> usize {
         let least_m = SLIVER * diagonal_m(&self.points_m);
@@ -338,7 +339,7 @@ impl Mesh {
                     }
                     Some(_) => {}
                     None => {
-                        // At a border it is a line on the rim.
+                        // At a border, collapse it to a point.
                         self.triangles[i] = [middle; 3];
                         (changed[i], any) = (true, true);
                         flipped += 1;
@@ -353,7 +354,7 @@ impl Mesh {
         flipped
     }
 
-    /// Removes points of no triangle.
+    /// Removes points without a triangle.
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 points
     fn drop_unused(&mut self) {
         let mut number = vec![u32::MAX; self.points_m.len()];

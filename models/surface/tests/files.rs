@@ -183,8 +183,18 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
         },
         Told::Healed("twice"),
     );
-    with("two corners of one point", ball(), &|s| s.triangles.push([3, 3, 7]), Told::Healed("one point"));
-    with("three corners of one point", ball(), &|s| s.triangles.push([3, 3, 3]), Told::Healed("one point"));
+    with(
+        "two corners of one point",
+        ball(),
+        &|s| s.triangles.push([3, 3, 7]),
+        Told::Healed("corners coincide"),
+    );
+    with(
+        "three corners of one point",
+        ball(),
+        &|s| s.triangles.push([3, 3, 3]),
+        Told::Healed("corners coincide"),
+    );
     with("a hole", ball(), &|s| s.triangles.truncate(s.triangles.len() - 1), Told::Healed("open"));
     with("a face the wrong way round", ball(), &|s| s.triangles[9].swap(0, 1), Told::Healed("turned"));
     with(
@@ -265,7 +275,7 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
         ),
         Told::Healed("without area"),
     ));
-    rows.push(("a strip of one side", moebius(), Told::Refused("only one side")));
+    rows.push(("a strip of one side", moebius(), Told::Refused("not orientable")));
     let mut crossed = cube();
     let (other, first) =
         (cuboid(DVec3::splat(0.005), DVec3::new(0.012, 0.011, 0.03), 1), crossed.points.len() as u32);
@@ -400,7 +410,7 @@ fn a_unit_is_guessed_and_told() {
     };
     let (in_m, remarks) = size_mm(ball(1.0), &auto);
     let (in_mm, _) = size_mm(ball(1000.0), &auto);
-    assert!((in_m - in_mm).abs() < 1.0e-6 && remarks[0].contains("taken as m"), "{in_m} {in_mm}");
+    assert!((in_m - in_mm).abs() < 1.0e-6 && remarks[0].contains("assumed to be m;"), "{in_m} {in_mm}");
     let inch = Reading { unit: Unit::Inch, ..READING };
     assert!((size_mm(ball(1.0), &inch).0 - 0.0254 * in_m).abs() < 1.0e-6);
 }

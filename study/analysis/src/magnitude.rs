@@ -140,5 +140,5 @@ fn scaled(
         (!values.is_empty()).then(|| mean(&values))
     };
     let cells: Option<Vec<f64>> = conditions(&protocol.values).map(cell).collect();
-    cells.map_or_else(|| refuse("a stimulus was never rated"), Ok)
+    cells.map_or_else(|| refuse("a stimulus was never rated; complete more sittings"), Ok)
 }

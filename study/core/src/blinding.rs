@@ -32,7 +32,7 @@ impl Codes {
         if modality == self.a { "A" } else { "B" }
     }
 
-    /// Returns the code of a base or rated stimulus: 1, 2, ...; 0 for a value that is no level, such as a practice stimulus.
+    /// Returns the code of a base or rated stimulus: 1, 2, ...; 0 for a value that is not a level, such as a practice stimulus.
     #[must_use]
     pub fn level(&self, level: f64) -> usize {
         self.levels.iter().position(|known| *known == level).map_or(0, |index| index + 1)

@@ -1,4 +1,4 @@
-//! What varies within a trial, or from trial to trial within a condition.
+//! Stimulus: the setting that varies within a trial, or from trial to trial within a condition.
 
 use crate::value::{Setting, Value};
 use serde::{Deserialize, Serialize};

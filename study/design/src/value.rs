@@ -71,7 +71,9 @@ impl TryFrom<String> for Setting {
         }
         let parts = text.split_once('.').filter(|(part, key)| !part.is_empty() && !key.is_empty());
         let (part, key) = parts.ok_or_else(|| {
-            format!("`{text}` is no setting; write PART.KEY of the scene, like spring.gamma_n, or `picture`")
+            format!(
+                "`{text}` is not a setting; write PART.KEY of the scene, like spring.gamma_n, or `picture`"
+            )
         })?;
         Ok(Self::Scene { part: part.to_owned(), key: key.to_owned() })
     }

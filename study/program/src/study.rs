@@ -75,7 +75,7 @@ enum Task {
     Force(ForceArguments),
     /// Run a study file: begin, or resume an interrupted study
     Run(plan::RunArguments),
-    /// Show what a study file does, without a person: schedule, balance, length, power
+    /// Preview a study file without a person: schedule, balance, length, power
     Check(check::CheckArguments),
     /// Explore a spring by hand while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),

@@ -17,11 +17,11 @@ pub struct Detection {
     pub false_alarms: usize,
     /// Sensitivity: d' = z(H) - z(F).
     pub d_prime: f64,
-    /// Its interval.
+    /// Confidence interval of the sensitivity.
     pub d_prime_interval: [f64; 2],
     /// Criterion: c = -(z(H) + z(F)) / 2; positive for a subject who says yes rarely.
     pub criterion: f64,
-    /// Its interval.
+    /// Confidence interval of the criterion.
     pub criterion_interval: [f64; 2],
 }
 

@@ -39,7 +39,8 @@ pub struct Probit {
 
 /// 95 % quantile of chi-square with one degree of freedom.
 const LIKELIHOOD_RATIO: f64 = 3.841_458_820_694_124;
-/// Spread in ranges of the levels above which an end is no bound: the function is flat over the levels.
+/// Largest spread, in multiples of the range of the levels, of a bounded interval: with a larger spread the function is flat over
+/// the levels.
 const WIDEST: f64 = 1.0e3;
 /// Relative rounding of a log-likelihood: a few hundred roundings of its terms.
 const ROUNDING: f64 = 1.0e-13;

@@ -67,7 +67,7 @@ enum Role {
     /// An allocator for one process of the lab.
     Guard,
     Calibration,
-    /// Finds the law of a real thing.
+    /// Finds the law of a real object.
     Identify,
     /// Judges runs from outside.
     SceneTest,

@@ -250,8 +250,9 @@ fn a_scene_has_one_digest_bare_observed_recorded_and_watched() {
         let recorded = headless::run(scene, &registry, OPTIONS.seed, Some(&file), Demand::FORCE);
         assert_eq!(recorded.expect("it runs").trace_digest, bare, "{}: recorded", scene.title);
         let mut recording = Recording::open(&file).expect("it was recorded");
-        // A scene with a membrane has no energy, whoever asks for it.
-        let all = if scene.text.contains("\"membrane\"") { Demand::WRENCH } else { Demand::ALL };
+        // A scene with a membrane or a world has no energy, whoever asks for it.
+        let has_none = ["\"membrane\"", "\"world\""].iter().any(|model| scene.text.contains(model));
+        let all = if has_none { Demand::WRENCH } else { Demand::ALL };
         assert!(
             recording.all(|record| record.expect("it is whole").model.computed() == all),
             "{}",

@@ -62,6 +62,7 @@ mod replay;
 mod rod;
 mod rooms;
 mod safety;
+mod saved_run;
 mod scaffold;
 mod scene;
 mod scene_test;
@@ -88,4 +89,5 @@ mod two_hosts;
 mod validate;
 #[cfg(feature = "drop-ins")]
 mod vendor_sdks;
+mod worlds;
 mod z_width;

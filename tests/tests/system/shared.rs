@@ -176,7 +176,7 @@ fn what_cannot_be_shared_is_refused_in_one_line() {
             format!(
                 "{both}[[model.port]]\ndevice = \"left\"\nmapping = {{}}\n[[model.port]]\ndevice = \"left\"\nmapping = {{}}"
             ),
-            "each device has one at most",
+            "needs a different device of the model",
         ),
         (
             "device = \"left\"\n[[model.port]]\ndevice = \"left\"\nmapping = {}".to_owned(),

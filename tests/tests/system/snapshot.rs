@@ -24,10 +24,10 @@ const BETWEEN: usize = 20;
 /// Ticks after a restore: longer than any cached matrix of the rod lives.
 const AFTER: u64 = 40;
 
-type Settings = &'static [(&'static str, &'static str)];
+pub(super) type Settings = &'static [(&'static str, &'static str)];
 
 /// Every shipped model, in the variants whose states differ.
-const MODELS: &[(&Entry, Settings)] = &[
+pub(super) const MODELS: &[(&Entry, Settings)] = &[
     (&flotor_spring::FLOTOR_ENTRY, &[]),
     (&flotor_spring::FLOTOR_ENTRY, &[("variant", "thesis")]),
     (&flotor_spring::FLOTOR_ENTRY, &[("variant", "closed-form")]),

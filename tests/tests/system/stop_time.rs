@@ -40,7 +40,7 @@ fn stopped(statements: &[&str]) -> Outcome {
 fn assert_named(outcome: &Outcome, parts: &[&str]) {
     let warnings = outcome.later_warnings().join("\n");
     assert!(
-        warnings.contains("the emergency stop took longer than 20.0 ms: without force was `slow`"),
+        warnings.contains("the emergency stop took longer than 20.0 ms: zero force at `slow`"),
         "{warnings}"
     );
     let named = warnings.split([',', ';']).filter(|text| parts.iter().any(|part| text.contains(part)));

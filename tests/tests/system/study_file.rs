@@ -126,8 +126,7 @@ fn a_changed_study_file_is_refused_with_the_lines_that_changed() {
     let _ = scratch.file("a.study.toml", FILE.replace("[17, 26]", "[17]"));
     let ran = go();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
-    let said =
-        "another version of a.study.toml: line 6 on had `bases = [17, 26]`, and has `bases = [17]` now";
+    let said = "another version of a.study.toml: from line 6 on: `bases = [17, 26]`, now `bases = [17]`";
     assert!(ran.error().contains(said), "{ran:?}");
     for (text, reason) in [
         ("task = \"jnd\"\n[options]\nbases = [17\n", "a.study.toml:3: "),

@@ -201,7 +201,7 @@ impl History {
         self.samples.len()
     }
 
-    /// Returns whether there are no samples.
+    /// Returns true if there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()

@@ -68,7 +68,7 @@ enum Stage {
     Prompted,
     /// Loader, receiving a firmware: number of bytes so far.
     Loading(usize),
-    /// Firmware.
+    /// Firmware, running.
     Running,
 }
 
@@ -221,7 +221,7 @@ impl Machine {
                         self.latency_ms = LATENCY_MS;
                     }
                 }
-                // Stale bytes of the fault injection are behind the chip, not in it.
+                // Stale bytes of the fault injection come from beyond the chip, not from its buffer.
             }
             _ if number == Request::BaudRate as u8 => {
                 self.divisor = value;

@@ -93,7 +93,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             let mut clients = Clients::of(port)?;
             loop {
                 let stream = clients.wait_for_one()?;
-                // A host that disconnects is no failure.
+                // A host that disconnects is not a failure.
                 let _ = server::serve(stream, &device, Tenure::begin(&mut clients));
                 if arguments.once {
                     return Ok(());

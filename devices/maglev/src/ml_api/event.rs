@@ -71,7 +71,7 @@ impl Event {
         frame
     }
 
-    /// Decodes a frame; `None` for any bytes that are no event. Never panics.
+    /// Decodes a frame; `None` for any bytes that are not an event. Never panics.
     #[must_use]
     pub fn decode(frame: &[u8]) -> Option<Self> {
         let (id, mut fields) = Fields::of(frame)?;

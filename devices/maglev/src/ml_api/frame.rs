@@ -12,7 +12,7 @@ pub(super) trait Field: Copy {
     /// Appends the field to a frame.
     fn write(self, frame: &mut Frame);
 
-    /// Reads the field; `None` if bytes are missing or are no value of the type.
+    /// Reads the field; `None` if bytes are missing or are not a value of the type.
     fn read(fields: &mut Fields<'_>) -> Option<Self>;
 }
 

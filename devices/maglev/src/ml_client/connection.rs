@@ -18,7 +18,7 @@ pub(crate) enum NoResults {
     /// No reply within the timeout.
     #[error("the controller did not answer in time")]
     Silent,
-    /// The received frame is no reply to the call.
+    /// The received frame is not a reply to the call.
     #[error("the controller sent a malformed reply")]
     Malformed,
     /// The controller rejected the call with this status.

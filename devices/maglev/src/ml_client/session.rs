@@ -248,7 +248,7 @@ impl Session {
             let _ = self.call(&Request::Pose(Function::SetDesiredPosition, pose));
         }
         let _ = self.call_within(&Request::Plain(Function::Land), PROCEDURE_PATIENCE);
-        // Ticks still in transit.
+        // Discard ticks that are still in transit.
         while let Ok(Some(_)) = self.next_event(Duration::ZERO) {}
         let _ = self.acknowledge_ticks();
     }

@@ -1,4 +1,4 @@
-//! Stop by a Land frame, on a connection of its own. Zero force is no safe state while levitating: the flotor would fall.
+//! Stop by a Land frame, on a connection of its own. Zero force is not a safe state while levitating: the flotor would fall.
 
 use super::connection::Line;
 use crate::ml_api::{Frame, Function, Request};

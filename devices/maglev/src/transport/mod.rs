@@ -32,7 +32,7 @@ const NAP: Duration = Duration::from_micros(250);
 pub enum Incoming {
     /// A packet of the right length.
     Packet([u8; FRAME_BYTES]),
-    /// Data of another length, or not decodable.
+    /// Data of a wrong length, or undecodable data.
     Malformed,
     /// No data available.
     Nothing,

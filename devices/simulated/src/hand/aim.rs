@@ -23,7 +23,7 @@ impl Pose {
     /// Rounding tolerance of a unit quaternion's length in user input.
     const LENGTH_TOLERANCE: f64 = 1.0e-6;
 
-    /// Rejects non-finite numbers and quaternions that are no rotation. Real-time: bounded, no allocation.
+    /// Rejects non-finite numbers and quaternions that are not a rotation. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If a number is not finite, or the quaternion has not unit length.

@@ -1,4 +1,4 @@
-//! Grids of equal steps of a piece of time, with the responses of the oscillator.
+//! Division of a time interval into equal steps, with the responses of the oscillator.
 
 use super::body::Body;
 use super::motion::Motion;
@@ -8,7 +8,7 @@ use crate::hand::Intention;
 use crate::ledger::Work;
 use crate::units::seconds;
 
-/// Largest number of steps of a piece.
+/// Maximum number of steps of an interval.
 pub(super) const MAX_STEPS: u32 = 128;
 
 /// Grid of equal steps, with the response of the oscillator in a step.
@@ -35,7 +35,7 @@ pub(super) struct Node {
 }
 
 impl Grid {
-    /// Divides a piece into at least `at_least` steps, at most [`MAX_STEPS`].
+    /// Divides an interval into at least `at_least` steps, at most [`MAX_STEPS`].
     pub(super) fn new(body: &Body, piece_ns: u64, at_least: f64) -> Self {
         let mut steps = 1;
         while f64::from(steps) < at_least && steps < MAX_STEPS {

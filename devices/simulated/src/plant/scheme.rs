@@ -1,4 +1,4 @@
-//! Division of pieces of time into steps, with tables for each step length.
+//! Division of time intervals into steps, with tables for each step length.
 //!
 //! A flotor without rotation and torque is integrated exactly; its steps are limited only by the series of the
 //! oscillator. A rotating flotor is integrated in finer steps, limited by the fastest rate of its rotation and of the
@@ -21,10 +21,10 @@ use flotor_hal::glam::DVec3;
 /// energy in the hand's springs.
 const MAX_TURNING_STEP: f64 = 0.1;
 
-/// Longest piece of one call of [`Plant::advance`](super::Plant::advance), ns. Callers split longer intervals.
+/// Maximum interval of one call of [`Plant::advance`](super::Plant::advance), ns. Callers split longer intervals.
 pub const MAX_PIECE_NS: u64 = 1_000_000;
 
-/// Body with the tables of two piece lengths: the nominal and the last other length.
+/// Body with the tables of two intervals: the nominal interval and the last other one.
 #[derive(Clone, Debug)]
 pub(super) struct Scheme {
     body: Body,
@@ -32,7 +32,7 @@ pub(super) struct Scheme {
     other: Table,
 }
 
-/// The two divisions of a piece length into steps.
+/// The two divisions of an interval into steps.
 #[derive(Clone, Copy, Debug)]
 struct Table {
     piece_ns: u64,
@@ -46,7 +46,7 @@ impl Scheme {
     /// Prepares the tables of a body. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If the longest piece would need more than [`MAX_STEPS`] steps.
+    /// If the maximum interval would need more than [`MAX_STEPS`] steps.
     pub(super) fn new(body: Body, nominal_ns: u64) -> Result<Self, InvalidParameter> {
         let most_steps = f64::from(MAX_STEPS);
         let steps = straight_steps(&body, MAX_PIECE_NS).max(turning_steps(&body, MAX_PIECE_NS));
@@ -113,7 +113,7 @@ impl Scheme {
         (motion.settled(), work)
     }
 
-    /// Returns the body and the table for a piece of `piece_ns`, computed unless stored.
+    /// Returns the body and the table for an interval of `piece_ns`, computed unless stored.
     #[inline]
     fn prepared(&mut self, piece_ns: u64) -> (&Body, &Table) {
         if piece_ns == self.nominal.piece_ns {
@@ -142,13 +142,13 @@ impl Table {
     }
 }
 
-/// Returns the number of steps of a piece for the series of the oscillator, not rounded up. Real-time: bounded, no
+/// Returns the number of steps of an interval needed for the series of the oscillator, not rounded up. Real-time: bounded, no
 /// allocation.
 fn straight_steps(body: &Body, piece_ns: u64) -> f64 {
     body.oscillator.rate_per_s() * seconds(piece_ns) / MAX_STEP_TIMES_RATE
 }
 
-/// Returns the number of steps of a piece for the accuracy of the rotation, not rounded up. Real-time: bounded, no
+/// Returns the number of steps of an interval needed for the accuracy of the rotation, not rounded up. Real-time: bounded, no
 /// allocation.
 fn turning_steps(body: &Body, piece_ns: u64) -> f64 {
     let coupled = body.centre_of_mass_m != DVec3::ZERO;

@@ -49,7 +49,7 @@ impl State {
         angular_velocity_rad_per_s: DVec3::ZERO,
     };
 
-    /// Rejects non-finite states and orientations that are no rotation. Real-time: bounded, no allocation.
+    /// Rejects non-finite states and orientations that are not a rotation. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If a part is not finite or no rotation; the error contains its name.

@@ -243,7 +243,7 @@ impl<'a> Step<'a> {
     }
 
     /// Returns the work of a step that displaces origin and centre of mass by `moved` (m).
-    #[inline]
+    #[inline(always)] // in the middle of a tick
     fn work(&self, drive: &Drive, end: &Motion, moved: DVec3) -> Work {
         let body = self.body;
         let velocity2 = self.grid.gramian.squared_velocity(drive);

@@ -30,6 +30,13 @@ impl InstanceState<'_> {
         CallStatus::from_code(self.calls.call(|instance| unsafe { save(instance, at, count) }))
     }
 
+    /// Saves the state to new memory; `None` if the plugin failed. Not real-time.
+    #[must_use]
+    pub fn to_bytes(&mut self) -> Option<Vec<u8>> {
+        let mut bytes = vec![0; usize::try_from(self.count()?).ok()?];
+        (self.save(&mut bytes) == CallStatus::Ok).then_some(bytes)
+    }
+
     /// Restores a saved state; after a failure the state is undefined. Real-time: bounded, no allocation.
     pub fn restore(&mut self, bytes: &[u8]) -> CallStatus {
         let (at, count) = (bytes.as_ptr(), bytes.len() as u64);

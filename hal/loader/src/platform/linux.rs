@@ -113,7 +113,7 @@ pub(crate) fn link_remedy(cause: &str) -> &'static str {
 /// Returns the bytes of the metadata section.
 ///
 /// # Errors
-/// [`NoSection`] if the file is no complete ELF library or has no metadata section.
+/// [`NoSection`] if the file is not a complete ELF library or has no metadata section.
 pub(crate) fn metadata_section<'d>(data: impl ReadRef<'d>, length: u64) -> Result<&'d [u8], NoSection> {
     // Check the header first: its section table is at the end of the file, which a truncation removes first.
     let header = FileHeader64::<Endianness>::parse(data)?;

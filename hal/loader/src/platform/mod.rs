@@ -21,7 +21,7 @@ pub(crate) use windows::{
 
 /// Reason why a file has no metadata section that can be read.
 pub(crate) enum NoSection {
-    /// The file is no library of this system.
+    /// The file is not a library of this system.
     NotALibrary(object::Error),
     /// The file is shorter than the library's tables require.
     Truncated {

@@ -112,7 +112,7 @@ fn remove_those_nobody_has(folder: &Path) {
 /// Returns the bytes of the metadata section.
 ///
 /// # Errors
-/// [`NoSection`] if the file is no complete 64-bit PE library or has no metadata section.
+/// [`NoSection`] if the file is not a complete 64-bit PE library or has no metadata section.
 pub(crate) fn metadata_section<'d>(data: impl ReadRef<'d>, length: u64) -> Result<&'d [u8], NoSection> {
     let dos = ImageDosHeader::parse(data)?;
     let mut offset = u64::from(dos.nt_headers_offset());

@@ -22,7 +22,7 @@ pub(crate) use std::os::unix::net::UnixStream as Stream;
 /// Permissions of a folder that only its owner may enter.
 const PRIVATE: u32 = 0o700;
 
-/// Returns the folder for the runs of this user if `XDG_RUNTIME_DIR` is no folder.
+/// Returns the folder for the runs of this user if `XDG_RUNTIME_DIR` is not a folder.
 pub(crate) fn run_folder() -> PathBuf {
     std::env::temp_dir().join(format!("flotor-{}", getuid().as_raw()))
 }

@@ -106,6 +106,12 @@ impl Engine {
         each!(self, model => model.parameter(index))
     }
 
+    /// Returns the present values of all parameters of a model in the loop; none of any other. Not real-time.
+    pub fn parameters(&mut self) -> Vec<f64> {
+        let Self::Here(model) = self else { return Vec::new() };
+        (0..model.parameters().len()).map(|index| model.parameter(index)).collect()
+    }
+
     /// Returns the outputs that the model can compute.
     pub fn serves(&self) -> Demand {
         each!(self, model => model.serves())
@@ -190,7 +196,7 @@ impl Engine {
         }
     }
 
-    /// Returns what the hand at a port has felt of the stiffness of contacts, in the model frame. Real-time: bounded, no allocation.
+    /// Returns the reductions of contact stiffness at a port, in the model frame. Real-time: bounded, no allocation.
     pub fn felt_stiffness(&self, port: usize) -> FeltStiffness {
         match self {
             Self::Asynchronous(model) => model.felt_stiffness(port),

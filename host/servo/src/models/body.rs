@@ -36,6 +36,9 @@ pub(crate) trait Body {
         health: &mut ModelHealth,
     ) -> CallStatus;
 
+    /// Returns the present values of the parameters, which all instances have in common. Not real-time.
+    fn parameters(&mut self) -> Vec<f64>;
+
     /// Iterates over the states of the instances before a tick; `None` for one whose state cannot be saved. A path-dependent
     /// instance that was not stepped in the last tick is reset first, as before its next step.
     fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>>;

@@ -37,7 +37,28 @@ pub struct LayerReport {
     pub words: String,
 }
 
+/// Saved state of a layer, without the states of its instances.
+pub(crate) struct SavedLayer<B: Body> {
+    budget: TimeBudget,
+    last: B::Share,
+    health: ModelHealth,
+}
+
 impl<B: Body> ModelLayer<B> {
+    /// Saves the state; `None` if an instance is disabled. Not real-time.
+    pub(super) fn save(&self) -> Option<SavedLayer<B>> {
+        let Self { budget, last, health, .. } = self;
+        let is_whole = health.panicked_at.is_none() && health.lost_at.is_none();
+        is_whole.then(|| SavedLayer { budget: budget.clone(), last: *last, health: *health })
+    }
+
+    /// Restores a state; `None` if an instance is disabled. Not real-time.
+    pub(super) fn restore(&mut self, saved: &SavedLayer<B>) -> Option<()> {
+        self.save()?;
+        (self.budget, self.last, self.health) = (saved.budget.clone(), saved.last, saved.health);
+        Some(())
+    }
+
     /// Creates a layer from instances that compute the outputs `serves`, with their common time budget. Not real-time.
     pub(super) fn new(body: B, serves: Demand, blend: &Blend, budget: TimeBudget) -> Self {
         Self {

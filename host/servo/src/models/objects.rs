@@ -108,6 +108,10 @@ impl Body for Objects {
         worst
     }
 
+    fn parameters(&mut self) -> Vec<f64> {
+        self.objects.first_mut().map_or_else(Vec::new, |object| object.instance.model.parameters())
+    }
+
     fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
         let memory = self.memory;
         self.objects.iter_mut().map(move |object| object.instance.state(tick, memory))

@@ -29,7 +29,7 @@ impl Placement {
         }
     }
 
-    /// Adds what the hand has felt of the stiffness of contacts, model frame, to the counters of the model. Not real-time.
+    /// Adds the reductions of contact stiffness, model frame, to the counters of the model. Not real-time.
     pub(super) fn note_stiffness(&self, felt: &FeltStiffness, contacts: &mut ContactHealth) {
         let scale = self.mapping.stiffness_scale();
         contacts.undamped_n_per_m = contacts.undamped_n_per_m.max(felt.undamped_n_per_m * scale);

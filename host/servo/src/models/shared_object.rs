@@ -114,6 +114,10 @@ impl Body for SharedObject {
         status
     }
 
+    fn parameters(&mut self) -> Vec<f64> {
+        self.instance.model.parameters()
+    }
+
     fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
         std::iter::once(self.instance.state(tick, self.memory))
     }

@@ -6,8 +6,10 @@
 
 use super::body::Body;
 use super::contribution::Share;
-use super::model_layer::{LayerReport, ModelLayer};
+use super::model_layer::{LayerReport, ModelLayer, SavedLayer};
 use super::objects::Objects;
+use crate::Unsaved;
+use flotor_core::PluginIndex;
 use flotor_core::broad_phase::Bounds;
 use flotor_core::health::ModelHealth;
 use flotor_core::weight::Fade;
@@ -32,7 +34,41 @@ pub(crate) struct Slot<B: Body> {
     fade_s: f64,
 }
 
+/// Saved state of a slot, without the states of its instances.
+pub(crate) struct SavedSlot<B: Body> {
+    generation: u16,
+    fades: [Fade; 2],
+    layer: SavedLayer<B>,
+    parameters: Vec<f64>,
+}
+
 impl<B: Body> Slot<B> {
+    /// Saves the state; an error while a layer fades out. Not real-time.
+    pub(crate) fn save(&mut self, plugin: PluginIndex) -> Result<SavedSlot<B>, Unsaved> {
+        let Self { current, presence, leaving: None, rest: None, weight, .. } = self else {
+            return Err(Unsaved::Fading(plugin));
+        };
+        let layer = current.save().ok_or(Unsaved::Plugin(plugin))?;
+        let parameters = current.body.parameters();
+        Ok(SavedSlot { generation: current.generation, fades: [*presence, *weight], layer, parameters })
+    }
+
+    /// Restores a state, without parameters. Not real-time.
+    pub(crate) fn restore(&mut self, saved: &SavedSlot<B>, plugin: PluginIndex) -> Result<(), Unsaved> {
+        let is_same = (self.generation(), self.is_fading()) == (saved.generation, false);
+        (is_same).then_some(()).ok_or(Unsaved::Replaced(plugin))?;
+        self.current.restore(&saved.layer).ok_or(Unsaved::Plugin(plugin))?;
+        [self.presence, self.weight] = saved.fades;
+        Ok(())
+    }
+
+    /// Returns the parameters that have another value than the saved one, with the saved value. Not real-time.
+    pub(crate) fn changed(&mut self, saved: &SavedSlot<B>) -> Vec<(usize, f64)> {
+        let both = self.current.body.parameters().into_iter().zip(&saved.parameters).enumerate();
+        let others = both.filter(|(_, (now, saved))| now.to_bits() != saved.to_bits());
+        others.map(|(index, (_, saved))| (index, *saved)).collect()
+    }
+
     /// Creates a slot with its first layer. Not real-time.
     pub(super) fn new(number: usize, layer: Box<ModelLayer<B>>) -> Self {
         let blend = layer.blend;

@@ -69,6 +69,11 @@ impl ModelStack {
         Self { slots, broad, levels, observable, shared_observable: Demand::ALL }
     }
 
+    /// Returns the gains of the levels, to save or restore them. Not real-time.
+    pub(crate) fn gains(&mut self) -> impl Iterator<Item = &mut Fade> {
+        self.levels.iter_mut().map(|level| &mut level.gain)
+    }
+
     /// Returns the outputs that the sum of the models has: energy only if every model computes its energy. Real-time: bounded, no
     /// allocation.
     #[inline]

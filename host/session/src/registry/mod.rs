@@ -164,7 +164,7 @@ impl Registry {
             match read_metadata(&file) {
                 Ok(metadata) => match found.iter().find(|known| known.id == metadata.id) {
                     None => found.push(metadata),
-                    // Cargo links its output into two folders: two names of one file are no conflict.
+                    // Cargo links its output into two folders: two names of one file are not a conflict.
                     Some(known) if is_same_file(&known.path, &metadata.path) => {}
                     Some(known) if known.path.parent() == metadata.path.parent() => {
                         ambiguous.push((known.clone(), metadata));
@@ -215,7 +215,7 @@ impl Registry {
     /// Checks that an id (or a path to a file) resolves to a plugin, without running its code. Not real-time.
     ///
     /// # Errors
-    /// [`LookupError`] if the id is unknown or ambiguous, the file at the path is no plugin, or the plugin is not of this kind.
+    /// [`LookupError`] if the id is unknown or ambiguous, the file at the path is not a plugin, or the plugin is not of this kind.
     pub fn check(&self, id: &str, kind: PluginKind) -> Result<(), LookupError> {
         match self.locate(id, Some(kind))? {
             Located::Linked(_) | Located::Found(_) => Ok(()),
@@ -235,7 +235,7 @@ impl Registry {
         }
     }
 
-    /// Returns true if a command or a scene names a plugin by the path of its file: the name contains a separator, or is no id but
+    /// Returns true if a command or a scene names a plugin by the path of its file: the name contains a separator, or is not an id but
     /// the name of a file in the current folder. Not real-time.
     #[must_use]
     pub fn is_path(&self, name: &str) -> bool {
@@ -278,9 +278,12 @@ impl Registry {
         let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
         let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
-        // Outside the default build: only meshes need its readers.
-        let command = "build it in Flotor's sources: `cargo build --release -p flotor-surface`";
-        let by_name = || (id == "surface").then(|| command.to_owned());
+        // Outside the default build, for what they alone need: readers of meshes, the solver of bodies, Python.
+        let optional =
+            [("surface", "flotor-surface"), ("world", "flotor-world"), ("python", "flotor-python-model")];
+        let package = optional.into_iter().find(|(plugin, _)| *plugin == id).map(|(_, package)| package);
+        let by_name =
+            || package.map(|name| format!("build it in Flotor's sources: `cargo build --release -p {name}`"));
         LookupError::Unknown {
             id: id.to_owned(),
             kind,

@@ -44,7 +44,7 @@ pub(super) fn read(
         section.finish()?;
         if !on.contains(&device) || own.iter().any(|(of, ..)| *of == device) {
             return Err(
-                here.problem("a `model.port` is on a device of the model, and each device has one at most")
+                here.problem("each `model.port` needs a different device of the model; correct its `device`")
             );
         }
         own.push((device, config, places_m));

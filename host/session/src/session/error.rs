@@ -37,6 +37,9 @@ pub enum RunError {
     /// The servo thread failed, with a verb phrase for the message.
     #[error("internal error: the servo thread {0}; please report this error with the scene")]
     Thread(&'static str),
+    /// The state of the run cannot be saved or restored, with the cause.
+    #[error("the state of the run cannot be saved or restored: {0}")]
+    Unsaved(String),
     /// The system cannot start the thread for this part of the run.
     #[error("cannot start the thread for {0}, so no device was moved; {THREAD_ADVICE}")]
     NoThread(&'static str),

@@ -21,10 +21,10 @@ mod unguarded;
 mod virtual_loop;
 
 pub use ceiling::{Strength, StrongDevice};
-pub use controls::{ControlError, Controls, FaultyPlugin, NewValue};
+pub use controls::{ControlError, Controls, FaultyPlugin, LiveNumbers, NewValue};
 pub use error::RunError;
 pub use latch::{LatchGuard, LatchWatch, StopReach};
-pub use lockstep::Lockstep;
+pub use lockstep::{Lockstep, SavedRun};
 pub use observer::{Observer, Tap};
 pub use outcome::{DeviceOutcome, Outcome};
 pub use plugin_report::PluginReport;

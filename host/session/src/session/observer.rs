@@ -1,5 +1,6 @@
 //! Observers of a run: [`Observer`] receives every tick, [`Tap`] reads the newest.
 
+use flotor_core::tally::Tally;
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_core::{Change, ModelOutputs};
 use flotor_hal::{Demand, Pose, Twist, Wrench};
@@ -12,10 +13,21 @@ pub trait Observer {
     /// Receives a change of a parameter, a weight or a model, before the record of the first tick with the change. Not real-time.
     fn change(&mut self, _change: &Change) {}
 
+    /// Returns true if the observer reads the changes of the run.
+    fn reads_changes(&self) -> bool {
+        true
+    }
+
     /// Returns the model outputs that the observer reads; the loop computes the others only where the hand feels them. Called
     /// before the run and repeatedly during the run. Not real-time.
     fn demand(&self) -> Demand {
         Demand::FORCE
+    }
+}
+
+impl Observer for Tally {
+    fn observe(&mut self, record: &TickRecord) {
+        self.add(record);
     }
 }
 

@@ -73,7 +73,7 @@ impl StopTime {
         let late: Vec<String> = late.collect();
         (!late.is_empty()).then(|| {
             format!(
-                "the emergency stop took longer than {}: without force was {}; {} passed before the last tick, {} in it",
+                "the emergency stop took longer than {}: zero force at {}; {} passed before the last tick, {} during it",
                 ms(BOUND),
                 late.join(", "),
                 ms(self.before_the_tick),

@@ -5,11 +5,11 @@ use super::{
     RunSummary, StageSummary,
 };
 use crate::scene::Isolation;
-use crate::tally::{DeviceTally, Tally};
 use crate::telemetry::LinkCounts;
 use crate::{FaultyPlugin, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
+use flotor_core::tally::{DeviceTally, Tally};
 use flotor_core::trace::Events;
 use flotor_coupling::LinkStatistics;
 use flotor_hal::{Demand, EnergyLedger, GripKind};

@@ -3,7 +3,7 @@
 mod build;
 mod text;
 
-pub use crate::tally::Tally;
+pub use flotor_core::tally::Tally;
 
 use crate::scene::Scene;
 use crate::telemetry::LinkCounts;

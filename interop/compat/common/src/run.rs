@@ -53,7 +53,7 @@ struct Draft {
     written: Option<Instant>,
 }
 
-/// Interval of the intermediate summary; interval of the check whether it is due, ticks.
+/// Interval of the intermediate summary; below, number of ticks between two checks of this interval.
 const DRAFT_PERIOD: Duration = Duration::from_millis(500);
 const DRAFT_LOOK: u64 = 64;
 

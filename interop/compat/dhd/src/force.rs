@@ -133,7 +133,7 @@ export! {
         }
         keep(id, |device| device.vibration = [frequency_hz, amplitude_n])
     }
-    /// Returns an error: a gripper is no button.
+    /// Returns an error: a gripper is not a button.
     fn dhdEmulateButton(_on: c_uchar, _id: i8) -> c_int [-1] { failed(Code::NotAvailable) }
     /// Does nothing: the device needs no calibration.
     fn dhdReset(id: i8) -> c_int [-1] { read(id, |_| ()) }

@@ -66,7 +66,7 @@ pub(crate) fn accept(
             }
             let place = Arc::clone(&served);
             let thread = std::thread::Builder::new().name("flotor-client".to_owned());
-            // Without a thread the connection is closed; a client that disconnects while it is served is no error.
+            // Without a thread the connection is closed; a client that disconnects while it is served is not an error.
             let _ = thread.spawn(move || {
                 let _place = place;
                 serve(stream)

@@ -1,4 +1,4 @@
-"""Flotor for Python: force models on NumPy arrays, scenes in virtual time, recordings as tables.
+"""Flotor for Python: force models on NumPy arrays, runs of scenes, live or in virtual time, recordings as tables.
 
 Everything is SI: metres, radians, seconds, newtons, newton metres, joules; time in integer nanoseconds. Poses are
 given in the model frame: right-handed, z up, origin at the handle's home.
@@ -12,16 +12,18 @@ given in the model frame: right-handed, z up, origin at the handle's home.
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from . import _flotor
-from ._flotor import EVENTS, FlotorError, Parameter, __version__
+from . import _command, _flotor, _scene
+from ._flotor import EVENTS, FlotorError, Parameter, SavedState, State, __version__
+from ._run import JoinedRun, Run, RunFailed, join, open, told  # noqa: A004
+from ._scene import folders as _folders
+from ._scene import text as _text
 
 __all__ = [
     "DEMAND_ALL",
@@ -34,17 +36,25 @@ __all__ = [
     "STATUS",
     "Evaluation",
     "FlotorError",
+    "JoinedRun",
     "Model",
     "Parameter",
     "PluginInfo",
     "Recording",
+    "Run",
     "RunFailed",
+    "SavedState",
+    "State",
     "__version__",
+    "join",
+    "open",
     "plugins",
     "read_recording",
     "run",
     "sweep",
 ]
+
+_flotor.enter_program(_command.program())
 
 #: NumPy record of one model input, 136 bytes: pose, twist, time, buttons, demand.
 INPUT = _flotor.input_dtype()
@@ -54,30 +64,6 @@ OUTPUT = _flotor.output_dtype()
 STATUS = ("ok", "clamped", "out_of_domain", "not_converged", "invalid_input")
 #: Bits of an input's ``demand``: a model need not compute other outputs.
 DEMAND_FORCE, DEMAND_TORQUE, DEMAND_ENERGY, DEMAND_ALL = 1, 2, 4, 7
-
-
-def _folders() -> list[Path]:
-    """Plugin folders in search order: the folders in ``FLOTOR_PLUGIN_PATH``, then the folder of this package."""
-    listed = os.environ.get("FLOTOR_PLUGIN_PATH", "").split(os.pathsep)
-    return [Path(folder) for folder in listed if folder] + [Path(__file__).parent / "plugins"]
-
-
-def _text(value: object) -> str:
-    """Formats a parameter's value as in a scene; floats are exact."""
-    if isinstance(value, bool):
-        raise FlotorError(f"{value!r} is not a value of a parameter; write a choice as a word, like 'on' or 'off'")
-    if isinstance(value, str):
-        return value
-    return repr(float(value))
-
-
-class RunFailed(FlotorError):
-    """Error of a run that ended early, or in which a model failed; ``flotor run`` has an exit code other than 0."""
-
-    def __init__(self, problem: str, summary: dict[str, object]) -> None:
-        super().__init__(problem)
-        #: Summary of the run, with the keys of the result of :func:`run`.
-        self.summary = summary
 
 
 class PluginInfo(NamedTuple):
@@ -247,8 +233,8 @@ def run(
 ) -> dict[str, object]:
     """Runs a scene in virtual time; returns the summary, with the keys of ``flotor run --json``.
 
-    ``scene`` is a scene file (TOML), the name of one of Flotor's own scenes, or a mapping with the keys of a scene file, such as
-    ``tomllib.loads`` returns; None runs the demo.
+    ``scene`` is a scene file (TOML), the name of one of Flotor's own scenes, the text of a scene (of more than one line), or a
+    mapping with the keys of a scene file, such as ``tomllib.loads`` returns; None runs the demo.
 
     ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``, or
     ``{"spring": {"variant": "closed-form"}}``. Equal arguments give an equal ``trace_digest``.
@@ -256,62 +242,8 @@ def run(
     Raises :class:`FlotorError` for an invalid scene or argument, and :class:`RunFailed`, which has the summary, if a model failed
     or the run ended early.
     """
-    text = _scene_text(scene) if isinstance(scene, Mapping) else None
-    summary = _flotor.run_scene(
-        None if scene is None or text is not None else Path(scene),
-        text=text,
-        folders=_folders(),
-        duration_s=duration_s,
-        rate_hz=rate_hz,
-        seed=seed,
-        settings=[f"{key}={_text(value)}" for key, value in _by_plugin_and_id(settings or {})],
-        recording=None if record is None else Path(record),
-    )
-    summary = json.loads(summary)
-    problem = _problem(summary)
-    if problem is not None:
-        raise RunFailed(problem, summary)
-    return summary
-
-
-def _scene_text(scene: Mapping[str, object]) -> str:
-    """Formats a scene as TOML, one line for each key of the scene."""
-    return "".join(f"{_quoted(key)} = {_toml(value)}\n" for key, value in scene.items())
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_quoted(key)} = {_toml(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, str | os.PathLike):
-        return _quoted(os.fspath(value))
-    if isinstance(value, bool | int | float | np.number | np.bool_):
-        value = value.item() if isinstance(value, np.generic) else value
-        return repr(value).lower()
-    raise FlotorError(f"{value!r} has no place in a scene; write numbers, texts, lists and mappings")
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _by_plugin_and_id(settings: Mapping[str, object]) -> Iterator[tuple[str, object]]:
-    """Yields each setting as ``plugin.id`` and its value; settings may be grouped by plugin."""
-    for key, value in settings.items():
-        if isinstance(value, Mapping):
-            yield from ((f"{key}.{id}", each) for id, each in value.items())
-        else:
-            yield key, value
-
-
-def _problem(summary: dict[str, object]) -> str | None:
-    """Returns the first failure of a model in a run, or the cause of an early end; None without either."""
-    for plugin in summary["plugins"]:
-        if plugin["kind"] == "model" and plugin["health"] != "ok":
-            return f"`{plugin['name']}` {plugin['health']}"
-    end = summary["end"]
-    return None if end in ("finished", "stopped") else f"the run ended early: {end}; the `summary` of this error has the details"
+    given = _scene.given(scene, duration_s=duration_s, rate_hz=rate_hz, seed=seed, settings=settings)
+    return told(*_flotor.run_scene(given, None if record is None else Path(record)))
 
 
 class Recording:

@@ -1,4 +1,5 @@
-//! `flotor identify`: the law of a real thing. Command line of the program `flotor-identify`, which `flotor` starts.
+//! `flotor identify`: identification of the force law of a real object. Command line of the program `flotor-identify`, which
+//! `flotor` starts.
 
 mod output;
 
@@ -15,13 +16,13 @@ use flotor_hal::read_text;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Identify real things; `flotor identify` starts this program.
+/// Identify the force law of a real object; `flotor identify` starts this program.
 #[derive(Subcommand)]
 enum Command {
     Identify(IdentifyArguments),
 }
 
-/// Function that returns the command-line parser of all commands. Not real-time.
+/// Function that returns the command-line parser of the program. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.
@@ -31,11 +32,11 @@ pub fn main() -> ExitCode {
     exit_code_of(run(&arguments))
 }
 
-/// Find the force law of a thing from measured force and displacement, with the errors of its parameters.
+/// Find the force law of a real object from measured force and displacement, with the errors of its parameters.
 #[derive(Args)]
 #[command(
-    after_help = "A table has a header with `displacement_m` or `displacement_mm` (into the thing positive), `force_n` (on the \
-    thing positive), and `time_s` for laws that depend on the velocity; other columns are not read. A recording gives the \
+    after_help = "A table has a header with `displacement_m` or `displacement_mm` (positive into the object), `force_n` (on the \
+    object positive), and `time_s` for laws that depend on the velocity; other columns are ignored. A recording gives the \
     motion and the delivered force along one axis, or the force of its force sensor.\n\n\
     Laws, d the depth beyond `contact_m`, v its velocity:\n  \
     linear         F = k d\n  \
@@ -45,11 +46,11 @@ pub fn main() -> ExitCode {
     zener          F = k d + q,  dq/dt = E v - q / tau\n  \
     hysteresis     F = k d + z,  dz = kappa dd within |z| <= friction\n  \
     table          smooth curve through 17 points\n\n\
-    The command chooses the simplest law whose error of prediction is within one standard error of the best one. If the \
-    residuals still have structure that noise does not have, the answer is `none of these`.\n\n\
+    The command chooses the simplest law whose prediction error is within one standard error of the best one. If its \
+    residuals are not noise alone, the result is `none of these`.\n\n\
     Examples:\n  \
     flotor identify pressed.csv\n  \
-    flotor identify pressed.csv --out thing --json thing.json\n  \
+    flotor identify pressed.csv --out ball --json ball.json\n  \
     flotor identify run.mcap --axis z\n  \
     flotor identify pressed.csv --law hertz --force-error 0.5"
 )]
@@ -140,7 +141,7 @@ fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         identified.map_err(|error| CommandError::Usage(format!("{}: {error}", file.display())))?;
     if law.is_some() && identified.law.is_none() {
         note(format_args!(
-            "the law `{}` leaves {:.4} N that are no noise; without --law the command searches for a better one",
+            "the law `{}` leaves {:.4} N that is not noise; without --law the command searches for a better one",
             identified.closest.id(),
             identified.structure_n
         ));
@@ -149,7 +150,7 @@ fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
     output::write(&measurement, &identified, out.as_deref(), json)
 }
 
-/// Reads a table, or a recording if the file is named so.
+/// Reads a recording if the file has the extension `mcap`, otherwise a table.
 fn measurement(file: &Path, axis: Axis) -> Result<Measurement, CommandError> {
     if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
         return recording::read(file, axis).map_err(|error| match error {
@@ -160,7 +161,7 @@ fn measurement(file: &Path, axis: Axis) -> Result<Measurement, CommandError> {
     let parsed = read_text(file, "the measurement").and_then(|text| csv::parse(&text));
     let parsed = parsed.map_err(|problem| CommandError::Usage(problem.in_file(file.display())))?;
     if !parsed.ignored.is_empty() {
-        note(format_args!("{}: columns that were not read: {}", file.display(), parsed.ignored.join(", ")));
+        note(format_args!("{}: ignored columns: {}", file.display(), parsed.ignored.join(", ")));
     }
     Ok(parsed.measurement)
 }

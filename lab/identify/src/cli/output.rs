@@ -49,7 +49,7 @@ pub(super) fn write(
     let report = Report {
         law: identified.name(),
         closest: identified.closest.id(),
-        // Numbers of a law that does not hold would be taken for properties of the thing.
+        // Omit the parameters of a rejected law: readers would take them for properties of the object.
         parameters: identified.law.map_or(&[], |_| &identified.parameters),
         delay_s: identified.delay_s.as_ref(),
         rms_n: identified.rms_n,
@@ -81,7 +81,7 @@ fn write_folder(
 }
 
 fn to_text(identified: &Identification) -> String {
-    let mut lines = vec![style::title("law             error of prediction by cross-validation")];
+    let mut lines = vec![style::title("law             prediction error by cross-validation")];
     for rung in &identified.ladder {
         let mark = if rung.law == identified.closest { "  <- selected" } else { "" };
         lines.push(format!(
@@ -108,13 +108,13 @@ fn to_text(identified: &Identification) -> String {
         ));
     }
     lines.push(format!(
-        "residual {:.4} N, of which {:.4} N are no noise",
+        "residual {:.4} N, of which {:.4} N is not noise",
         identified.rms_n, identified.structure_n
     ));
     lines.join("\n")
 }
 
-/// Returns the number of decimals that show the width of an interval with two digits.
+/// Returns the number of decimals that shows the width of an interval to two digits.
 fn digits(estimate: &Estimate) -> usize {
     let width = estimate.high - estimate.low;
     let shows = |digits: &u8| width * powi(10.0, i32::from(*digits)) >= 10.0;

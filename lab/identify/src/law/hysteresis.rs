@@ -1,6 +1,6 @@
 //! Prandtl's element: a spring in series with a dry friction.
 
-/// Returns the force, N, at each sample; the element is without force before the first sample, and moves with the smooth depths.
+/// Returns the force, N, at each sample; the element has no force before the first sample, and follows the smoothed depths.
 pub(super) fn force_n(
     stiffness: f64,
     sticking: f64,

@@ -1,8 +1,9 @@
 //! Force laws of the ladder: their parameters and the force for a measured displacement.
 //!
-//! A law gives the force on the thing at each sample as a level and, where the force depends on the velocity `v`, an impulse whose
-//! rate of change adds to the level: with the depth `d`, the damping `c(d) v` of a law is `d/dt ∫ c(d) dd`. The rate of change of
-//! a mean over some samples needs the impulse at both ends only, so no noisy displacement is differentiated sample by sample.
+//! A law gives the force on the object at each sample as a level and, where the force depends on the velocity `v`, an impulse
+//! whose rate of change adds to the level: with the depth `d`, the damping `c(d) v` of a law is `d/dt ∫ c(d) dd`. The rate of
+//! change of a mean over some samples needs the impulse at both ends only, so the noisy displacement is not differentiated sample
+//! by sample.
 
 mod elastic;
 mod hysteresis;
@@ -27,16 +28,16 @@ pub enum Law {
     Zener,
     /// `F = k d + z` with a spring `kappa` in series with a dry friction `|z| <= f` (Prandtl 1928).
     Hysteresis,
-    /// Smooth curve through knots, without rate and direction.
+    /// Smooth curve through knots, independent of velocity and direction.
     Table,
 }
 
-/// Connection between the tool and the thing.
+/// Connection between tool and object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Connection {
-    /// The tool presses: no force without depth, and never a pull.
+    /// The tool only presses: no force without depth, and no pull.
     Presses,
-    /// The thing is attached to the tool: it is also pulled.
+    /// The object is attached to the tool, and also pulled.
     Attached,
 }
 
@@ -45,14 +46,14 @@ pub(crate) enum Connection {
 pub(crate) struct Form {
     pub(crate) id: &'static str,
     pub(crate) coordinate: Coordinate,
-    /// Prior mean and standard deviation of the coordinate, so weak that data with any information outweigh it.
+    /// Prior mean and standard deviation of the coordinate, so weak that any informative data outweigh it.
     pub(crate) prior: Option<(f64, f64)>,
 }
 
-/// Relation of a parameter to the coordinate of the fit, which is of the order of one in any units of the measurement.
+/// Relation of a parameter to the coordinate of the fit, which is of order one for any units of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Coordinate {
-    /// Displacement: smallest displacement plus so many spans.
+    /// Displacement: smallest displacement plus the coordinate times the span.
     Displacement,
     /// Positive parameter: exponential of the coordinate, in this unit.
     Positive(Unit),
@@ -75,14 +76,14 @@ impl Unit {
     }
 }
 
-/// Motion of a probe.
+/// Motion of the probe.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion<'a> {
     /// Times of the samples, s.
     pub(crate) time_s: &'a [f64],
     /// Displacements, m.
     pub(crate) displacement_m: &'a [f64],
-    /// Displacements without most of their noise, m, for an element that each change of direction works on.
+    /// Displacements with reduced noise, m, for an element that responds to every reversal.
     pub(crate) smooth_m: &'a [f64],
 }
 
@@ -92,7 +93,7 @@ pub(crate) struct Scales {
     pub(crate) lowest_m: f64,
     pub(crate) span_m: f64,
     pub(crate) force_n: f64,
-    /// Typical time of a change: span of the displacement over the root mean square of its velocity, s.
+    /// Characteristic time: span of the displacement over the root mean square of its velocity, s.
     pub(crate) time_s: f64,
 }
 
@@ -102,7 +103,7 @@ impl Scales {
         let (lowest_m, span_m) = (lowest(x), span(x));
         let force_n = f.iter().map(|force_n| force_n.abs()).fold(0.0, f64::max);
         let time_s = measurement.time_s().map_or(1.0, |time_s| {
-            // Means of some hundred samples: the noise of single samples would be taken for velocity.
+            // Use means of samples: the noise of single samples would count as velocity.
             let coarse = measurement.coarse(400);
             let path_m: f64 = coarse.displacement_m().windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
             span_m * span(time_s) / path_m.max(span_m)
@@ -116,7 +117,7 @@ impl Scales {
             * math::pow(self.time_s, unit.time)
     }
 
-    /// Returns the parameter for a coordinate of the fit.
+    /// Converts a coordinate of the fit to the parameter.
     pub(crate) fn parameter(&self, form: &Form, coordinate: f64) -> f64 {
         match form.coordinate {
             Coordinate::Displacement => self.lowest_m + self.span_m * coordinate,
@@ -126,12 +127,12 @@ impl Scales {
     }
 }
 
-/// Response of a thing to the displacement of a measurement: force on the thing at each sample.
+/// Response of a law to the motion of a measurement: force on the object at each sample.
 #[derive(Clone, Debug)]
 pub(crate) struct Response {
-    /// Part of the force that is known at each sample, N.
+    /// Part of the force without the impulse, N.
     pub(crate) level_n: Vec<f64>,
-    /// Impulse whose rate of change is the other part, N s; empty without one.
+    /// Impulse whose rate of change is the other part of the force, N·s; empty without one.
     pub(crate) impulse_ns: Vec<f64>,
 }
 
@@ -195,8 +196,8 @@ impl Law {
         matches!(self, Self::HuntCrossley | Self::Zener)
     }
 
-    /// Returns the parameters in the order of the coordinates of a fit: for all but the table first the amplitude, and last the
-    /// contact; for the table the forces at the knots.
+    /// Returns the parameters in the order of the coordinates of a fit: for the table the forces at the knots; for other laws the
+    /// amplitude is first and the contact last.
     pub(crate) fn forms(self) -> &'static [Form] {
         const K: Form = positive("stiffness_n_per_m", STIFFNESS);
         const KH: Form = positive("hertz_n_per_m_1_5", HERTZ);
@@ -291,8 +292,8 @@ impl Law {
         }
     }
 
-    /// Returns coordinates from which to search: `contacts` are possible coordinates of the contact. The amplitude is left to the
-    /// fit.
+    /// Returns initial guesses of the coordinates, for each initial guess of the contact in `contacts`. The fit sets the
+    /// amplitude.
     pub(crate) fn starts(self, contacts: &[f64]) -> Vec<Vec<f64>> {
         let shapes: &[&[f64]] = match self {
             Self::Linear | Self::Hertz => &[&[]],
@@ -310,7 +311,7 @@ impl Law {
 }
 
 impl Connection {
-    /// Removes pulls where the tool only presses.
+    /// Limits the force to at least 0 if the tool only presses.
     pub(crate) fn limited(self, mut force_n: Vec<f64>) -> Vec<f64> {
         if self == Self::Presses {
             force_n.iter_mut().for_each(|force_n| *force_n = force_n.max(0.0));

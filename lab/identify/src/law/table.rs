@@ -23,7 +23,7 @@ pub(super) const KNOTS: [Form; 17] = [
     knot("force_16_n"),
 ];
 
-/// The prior only holds knots without samples nearby.
+/// The prior only affects knots without samples nearby.
 const fn knot(id: &'static str) -> Form {
     around(signed(id, FORCE), 0.0, 10.0)
 }

@@ -3,7 +3,7 @@
 use flotor_hal::math;
 
 /// Returns the force, N, at each sample. The depth is linear in time between samples, for which the step of the Maxwell element
-/// is exact; before the first sample the thing is at rest.
+/// is exact; before the first sample the object is at rest.
 pub(super) fn force_n(
     stiffness: f64,
     maxwell: f64,
@@ -13,7 +13,7 @@ pub(super) fn force_n(
 ) -> Vec<f64> {
     let mut element_n = 0.0;
     let mut before: Option<(f64, f64)> = None;
-    // Most measurements have one period.
+    // Reuse the exponentials: most measurements have one period.
     let (mut period_s, mut kept, mut gained) = (f64::NAN, 1.0, 1.0);
     let step = |(depth_m, time_s): (f64, &f64)| {
         if let Some((depth_before_m, time_before_s)) = before {

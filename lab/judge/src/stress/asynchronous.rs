@@ -216,7 +216,7 @@ fn push(set: &ContactSet) -> DVec3 {
     pushes.sum::<DVec3>() + set.bilateral().wrench.force()
 }
 
-/// Measures pull, energy, steps and age of an asynchronous model.
+/// Measures pulling force, energy, force steps and age of results of an asynchronous model.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let is_asynchronous = setup.subject()?.model().has_local_model();
     let runs = (HAND_TICKS.len() * MODEL_TICKS.len()) as u64;

@@ -67,7 +67,7 @@ tally! {
 /// Change of wrench over a piece.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
-    /// Change beyond that at rest: a mass in motion or creep is no jump.
+    /// Change beyond that at rest: a mass in motion or creep is not a jump.
     beyond: Wrench,
     /// Change at rest in a tick.
     at_rest: Wrench,

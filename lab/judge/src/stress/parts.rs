@@ -197,8 +197,8 @@ pub fn deliver(
 /// (full), on all processors.
 ///
 /// # Errors
-/// [`LoadError`] if the plugin is no model or rejects the settings. A model that fails, hangs or crashes during a
-/// measure is no error: the measure reports it and fails.
+/// [`LoadError`] if the plugin is not a model or rejects the settings. A model that fails, hangs or crashes during a
+/// measure is not an error: the measure reports it and fails.
 pub fn score_in_processes(
     plugin: &Plugin,
     settings: &[Setting],

@@ -100,7 +100,7 @@ impl From<String> for Outcome {
     }
 }
 
-/// Converts a load error; a missing, busy or forbidden resource is no violation.
+/// Converts a load error; a missing, busy or forbidden resource is not a violation.
 impl From<LoadError> for Outcome {
     fn from(error: LoadError) -> Self {
         match error {

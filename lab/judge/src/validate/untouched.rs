@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Waiting time at the end, in which a leftover timer or signal would fire.
 const REST: Duration = Duration::from_millis(300);
 
-/// Parts that may grow while an instance exists, and after it.
+/// Permitted growth of the process state while an instance exists; below, after its end.
 const IN_LIFE: &[May] = &[May::Grow, May::GrowInLife];
 const AFTER: &[May] = &[May::Grow];
 

@@ -28,7 +28,8 @@ pub struct Speed {
     pub p99_ns: f64,
 }
 
-/// Times calls along the path, force and torque demanded; `None` for a model without that detail.
+/// Measures the duration of calls along a path, with force and torque demanded, split by the sign of a detail; `None` for a model
+/// without this detail.
 pub(super) fn split_times(
     model: &mut Model,
     detail: &str,

@@ -228,7 +228,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
             let name = case(text)?.name;
             cases.iter().position(|case| case.name == name).ok_or_else(|| {
                 CommandError::Usage(format!(
-                    "--yardstick {text}: this is none of the cases; choose one of them, or add --case {text}"
+                    "--yardstick {text}: not one of the cases; choose one of them, or add --case {text}"
                 ))
             })?
         }

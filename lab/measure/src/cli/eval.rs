@@ -86,7 +86,11 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 /// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     let file = if path.as_os_str() == "-" { "standard input".into() } else { path.display().to_string() };
-    let problem = |cause| CommandError::Usage(format!("{file}: cannot read the poses: {cause}"));
+    let problem = |cause| {
+        CommandError::Usage(format!(
+            "{file}: cannot read the poses: {cause}; check the path and its permissions"
+        ))
+    };
     let bytes = read(path).map_err(problem)?;
     Poses::parse(&file, bytes).map_err(|error| CommandError::Usage(error.to_string()))
 }

@@ -82,7 +82,7 @@ pub enum SnapshotError {
         /// Value of the instance; `nothing` if the plugin has no such parameter.
         present: String,
     },
-    /// The plugin failed, or the bytes are no state of this instance.
+    /// The plugin failed, or the bytes are not a state of this instance.
     #[error("`{id}` does not accept the bytes of the snapshot; save the state again")]
     Rejected {
         /// Id of the plugin.

@@ -1,7 +1,7 @@
 //! Stable equilibrium of the rod, followed from tick to tick.
 //!
 //! Newton's method finds a zero of the slope of the energy. Its matrix is reused for some ticks; the loss of accuracy is
-//! estimated at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is no minimum: the rod has
+//! estimated at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is not a minimum: the rod has
 //! buckled, or its branch has ended. From there the shape moves to lower energy in a damped flow, a bounded distance per tick,
 //! so that the force changes fast but never jumps. Only a stable equilibrium counts as converged.
 //!
@@ -99,7 +99,7 @@ pub(crate) enum Outcome {
     Settled(Reading),
     /// Moving to an equilibrium, with the present reading.
     Moving(Reading),
-    /// No finite number; the shape is as before.
+    /// The result is not finite; the shape is unchanged.
     Failed,
 }
 
@@ -259,8 +259,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let mut outcome = self.search(plate, demand);
         if matches!(outcome, Outcome::Moving(_)) && (may_miss || distance(&self.shape, &before) > LONGEST_WAY)
         {
-            // The branch ends between the last tick and this one, or coils meet, and the prediction went across: search
-            // from the last shape.
+            // The prediction crossed the end of the branch, or a coil contact: search from the last shape.
             self.shape = before;
             let work = std::mem::take(&mut self.work);
             // If there is no time for this search, the next tick searches.
@@ -445,7 +444,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.unstable_directions
     }
 
-    /// Makes one step of the damped flow, from a shape that is no minimum: an implicit Euler step down the slope of the
+    /// Makes one step of the damped flow, from a shape that is not a minimum: an implicit Euler step down the slope of the
     /// energy, of duration `1 / damping`, of at most `longest`.
     #[cold]
     fn slide(

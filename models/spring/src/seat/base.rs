@@ -72,7 +72,7 @@ pub(super) struct Base {
     pub(super) direction: DVec2,
     pub(super) angle_rad: f64,
     pub(super) rotation: DQuat,
-    /// Centre relative to the initial place.
+    /// Position of the base's centre relative to its initial position.
     pub(super) center_m: DVec3,
     lengths: Lengths,
     is_seated: bool,

@@ -1,8 +1,8 @@
-//! Numbers from bytes, each with a check that the bytes are there.
+//! Reader of binary numbers with bounds checks.
 
 use super::Problem;
 
-/// Order of the bytes of a number.
+/// Byte order of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
     Little,
@@ -33,7 +33,7 @@ impl Scalar {
     }
 }
 
-/// Reader of numbers at a moving place.
+/// Cursor that reads successive numbers.
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     pub(super) at: usize,
@@ -85,7 +85,7 @@ impl<'a> Cursor<'a> {
         })
     }
 
-    /// Reads a number that counts or numbers something.
+    /// Reads a count or an index.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked
     pub(super) fn index(&mut self, scalar: Scalar) -> Result<usize, Problem> {
         let at = self.at;

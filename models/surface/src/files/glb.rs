@@ -1,4 +1,4 @@
-//! Binary glTF 2.0: the triangles of all meshes, placed by the nodes of the scene; metres.
+//! Binary glTF 2.0: triangles of all meshes, transformed by the nodes of the scene, in metres.
 
 use super::bytes::{Cursor, Order, Scalar};
 use super::{At, NOT_FINITE, Problem, is_usable, next_index};
@@ -6,19 +6,19 @@ use crate::soup::Soup;
 use flotor_hal::glam::{DMat4, DQuat, DVec3};
 use serde_json::Value;
 
-/// Deepest nesting of nodes.
+/// Maximum depth of nested nodes.
 const DEEPEST: usize = 64;
-/// Most placements of meshes: each may repeat all triangles of the file.
+/// Maximum number of triangles of all mesh instances: a small file can repeat one mesh many times.
 const MOST_PLACED: usize = 20_000_000;
 
-/// Type of a JSON chunk and of a binary one.
+/// Types of the JSON chunk and of the binary chunk.
 const JSON: u32 = 0x4e4f_534a;
 const BINARY: u32 = 0x004e_4942;
 
 struct Glb<'a> {
     json: Value,
     binary: &'a [u8],
-    /// Place of the binary chunk in the file.
+    /// Offset of the binary chunk in the file.
     start: usize,
 }
 
@@ -33,7 +33,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Problem> {
         .find(|name| name.contains("draco") || name.contains("meshopt") || name.contains("quantization"))
     {
         return Err(Problem::file(format!(
-            "the mesh is stored with `{name}`, which is not read; export without compression"
+            "the mesh uses `{name}`, which is not supported; export the mesh without compression"
         )));
     }
     let scene = glb.json.get("scene").and_then(Value::as_u64).unwrap_or(0);
@@ -62,7 +62,7 @@ fn numbers<const N: usize>(value: &Value, key: &str) -> Option<[f64; N]> {
     list.try_into().ok()
 }
 
-/// Returns the placement of a node in its parent.
+/// Returns the transform of a node to its parent.
 fn placement(node: &Value) -> DMat4 {
     if let Some(columns) = numbers::<16>(node, "matrix") {
         return DMat4::from_cols_array(&columns);
@@ -78,7 +78,10 @@ impl<'a> Glb<'a> {
         let mut cursor = Cursor::new(bytes, 4, Order::Little);
         let version = cursor.index(Scalar::U32)?;
         if version != 2 {
-            return Err(Problem::byte(4, format!("glTF of version {version} is not read; export version 2")));
+            return Err(Problem::byte(
+                4,
+                format!("glTF version {version} is not supported; export version 2"),
+            ));
         }
         cursor.skip(4)?;
         let (mut json, mut binary, mut start) = (None, &bytes[..0], 0);
@@ -110,8 +113,9 @@ impl<'a> Glb<'a> {
     }
 
     fn node(&self, number: usize, parent: DMat4, depth: usize, soup: &mut Soup) -> Result<(), Problem> {
-        let missing =
-            || Problem::file(format!("node {number} is missing or lies in a circle; export the mesh again"));
+        let missing = || {
+            Problem::file(format!("node {number} is missing or its own descendant; export the mesh again"))
+        };
         if depth > DEEPEST {
             return Err(missing());
         }
@@ -156,7 +160,7 @@ impl<'a> Glb<'a> {
                     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked
                     let corner = row[0] as usize;
                     if row[0] < 0.0 || corner >= count {
-                        return Err("a triangle names a vertex that is not there; export the mesh again");
+                        return Err("a triangle has the index of a missing vertex; export the mesh again");
                     }
                     corners.push(first + corner);
                     Ok(())
@@ -165,7 +169,7 @@ impl<'a> Glb<'a> {
             }
             if soup.triangles.len() + corners.len() / 3 > MOST_PLACED {
                 return Err(Problem::file(
-                    "the nodes of the file repeat too many triangles; reduce the mesh",
+                    "the nodes of the file repeat its meshes too often; reduce the mesh or its instances",
                 ));
             }
             let is_mirrored = place.determinant() < 0.0;
@@ -192,18 +196,18 @@ impl<'a> Glb<'a> {
             |problem: &str| Problem::file(format!("accessor {accessor}: {problem}; export the mesh again"));
         let one = self.list(&self.json, "accessors").get(accessor).ok_or_else(|| wrong("it is missing"))?;
         if one.get("sparse").is_some() {
-            return Err(wrong("sparse data are not read"));
+            return Err(wrong("sparse data are not supported"));
         }
         let scalar = match index(one, "componentType") {
             Some(5121) => Scalar::U8,
             Some(5123) => Scalar::U16,
             Some(5125) => Scalar::U32,
             Some(5126) => Scalar::F32,
-            _ => return Err(wrong("its type of numbers is not read")),
+            _ => return Err(wrong("its component type is not supported")),
         };
         let kind = one.get("type").and_then(Value::as_str).unwrap_or_default();
         if kind != if width == 3 { "VEC3" } else { "SCALAR" } {
-            return Err(wrong("it has another number of columns than expected"));
+            return Err(wrong("it has the wrong number of components"));
         }
         let rows = index(one, "count").ok_or_else(|| wrong("it has no count"))?;
         let view = index(one, "bufferView").and_then(|view| self.list(&self.json, "bufferViews").get(view));

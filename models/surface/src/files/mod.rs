@@ -1,6 +1,6 @@
-//! Readers of mesh files. Each returns the triangles of the file, or the place and the remedy of what it cannot read. Not real-time.
+//! Readers of mesh files. Each returns the triangles of the file, or an error with its position and remedy. Not real-time.
 //!
-//! Memory is bounded by the size of the file: no count in a file is trusted before its data are there.
+//! Memory is bounded by the size of the file: a count in a file is checked against the available data.
 
 mod bytes;
 mod glb;
@@ -11,21 +11,21 @@ mod stl;
 use crate::soup::{LARGEST, MOST_TRIANGLES, Soup};
 use std::fmt;
 
-/// Place in a file.
+/// Position in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum At {
     /// Whole file.
     File,
-    /// Line of a text, from 1.
+    /// Line of a text file, from 1.
     Line(usize),
-    /// Byte of a binary file, from 0.
+    /// Byte offset in a binary file, from 0.
     Byte(usize),
 }
 
-/// File that cannot be read as a mesh.
+/// Error of reading a mesh file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Place in the file.
+    /// Position in the file.
     pub at: At,
     /// Cause and remedy.
     pub problem: String,
@@ -69,7 +69,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Returns the format of a file by its first bytes, else by the end of its name.
+    /// Returns the format of a file, from its first bytes or else from the extension of its name.
     #[must_use]
     pub fn of(name: &str, bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(b"glTF") {
@@ -111,27 +111,27 @@ pub fn read(name: &str, bytes: Vec<u8>) -> Result<Soup, Problem> {
     }
     if soup.triangles.len() > MOST_TRIANGLES {
         return Err(Problem::file(format!(
-            "{} triangles are too many, a surface may have {MOST_TRIANGLES}; reduce the mesh",
+            "the file has {} triangles, above the limit of {MOST_TRIANGLES}; reduce the mesh",
             soup.triangles.len()
         )));
     }
     Ok(soup)
 }
 
-/// Returns true for a coordinate that an object may have.
+/// Returns true for a finite coordinate of plausible size.
 fn is_usable(x: f64) -> bool {
     x.abs() <= LARGEST // false for NaN
 }
 
-const NOT_FINITE: &str = "a coordinate is not finite or beyond 1e9; export the mesh again";
+const NOT_FINITE: &str = "a coordinate is not finite, or its magnitude is above 1e9; export the mesh again";
 
-/// Splits a text into lines with their numbers.
+/// Decodes a text file (UTF-8).
 fn text(bytes: Vec<u8>) -> Result<String, Problem> {
     flotor_hal::text_from_bytes(bytes)
         .map_err(|wrong| Problem { at: At::Line(wrong.line), problem: wrong.problem })
 }
 
-/// Returns a number of vertices as the index of the next one.
+/// Returns the index of the next vertex after `count` vertices.
 fn next_index(count: usize, at: At) -> Result<u32, Problem> {
     u32::try_from(count)
         .ok()

@@ -1,4 +1,4 @@
-//! Wavefront OBJ: `v` and `f`; groups by `usemtl`, `g` or `o`, whatever came last.
+//! Wavefront OBJ: `v` and `f`; groups by the most recent of `usemtl`, `g` and `o`.
 
 use super::{At, NOT_FINITE, Problem, is_usable, next_index, text};
 use crate::soup::Soup;
@@ -49,7 +49,7 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                         let word: String = word.chars().take(20).flat_map(char::escape_debug).collect();
                         Problem::line(
                             number,
-                            format!("a face names the vertex `{word}`, but {} are given so far; export the mesh again", soup.points.len()),
+                            format!("a face has the vertex `{word}`, but the file has {} vertices up to this line; export the mesh again", soup.points.len()),
                         )
                     })?);
                 }
@@ -63,7 +63,7 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                 soup.push_polygon(&corners, group);
             }
             Some("usemtl" | "g" | "o") => group = Some(soup.group(&words.collect::<Vec<_>>().join(" "))),
-            // Curves, texture and display have nothing to touch.
+            // Curves, texture and display attributes have no triangles.
             _ => {}
         }
         continued.clear();

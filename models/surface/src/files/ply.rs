@@ -1,4 +1,4 @@
-//! PLY (Turk 1994): text, and binary with either order of bytes; vertices with `x`, `y`, `z`, faces with a list of vertices.
+//! PLY (Turk 1994): text, and binary with either byte order; vertices with `x`, `y`, `z`, faces with a list of vertices.
 
 use super::bytes::{Cursor, Order, Scalar};
 use super::{At, NOT_FINITE, Problem, is_usable, next_index, text};
@@ -7,12 +7,12 @@ use crate::soup::Soup;
 /// Property of an element.
 struct Property {
     name: String,
-    /// Type of the number before a list; `None` for a single number.
+    /// Type of the count before a list; `None` for a single number.
     count: Option<Scalar>,
     scalar: Scalar,
 }
 
-/// Kind of data, with the number of its rows.
+/// Element of the file with its number of rows.
 struct Element {
     name: String,
     rows: usize,
@@ -27,7 +27,7 @@ enum Encoding {
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
-    /// First byte and first line of the data.
+    /// First byte of the data; below, its first line.
     data: usize,
     line: usize,
 }
@@ -46,7 +46,7 @@ fn scalar(word: &str) -> Option<Scalar> {
     })
 }
 
-/// Longest line of a header, bytes.
+/// Maximum length of a header line, bytes.
 const LONGEST: usize = 1024;
 
 fn header(bytes: &[u8]) -> Result<Header, Problem> {
@@ -61,7 +61,7 @@ fn header(bytes: &[u8]) -> Result<Header, Problem> {
         let length =
             length.ok_or_else(|| wrong("the header has no `end_header`; copy or export the file again"))?;
         let text = std::str::from_utf8(&rest[..length])
-            .map_err(|_| wrong("the header is no text; export the mesh again"))?;
+            .map_err(|_| wrong("the header is not text; export the mesh again"))?;
         at += length + if rest[length..].starts_with(b"\r\n") { 2 } else { 1 };
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         match words[..] {
@@ -71,7 +71,7 @@ fn header(bytes: &[u8]) -> Result<Header, Problem> {
             ["element", name, rows] => {
                 let rows = rows
                     .parse()
-                    .map_err(|_| wrong("the number of rows is no whole number; export the mesh again"))?;
+                    .map_err(|_| wrong("the number of rows is not a whole number; export the mesh again"))?;
                 elements.push(Element { name: name.to_owned(), rows, properties: Vec::new() });
             }
             ["property", ref kind @ .., name] => {
@@ -86,16 +86,16 @@ fn header(bytes: &[u8]) -> Result<Header, Problem> {
                     .ok_or_else(|| wrong("the type of the property is unknown; export the mesh again"))?;
                 let element = elements
                     .last_mut()
-                    .ok_or_else(|| wrong("a property stands before its element; export the mesh again"))?;
+                    .ok_or_else(|| wrong("a property precedes the first element; export the mesh again"))?;
                 element.properties.push(Property { name: name.to_owned(), count, scalar });
             }
             ["end_header"] => break,
             ["ply"] | ["comment", ..] | ["obj_info", ..] | [] => {}
-            _ => return Err(wrong("the line is no line of a PLY header; export the mesh again")),
+            _ => return Err(wrong("the line does not belong to a PLY header; export the mesh again")),
         }
     }
     let encoding = encoding
-        .ok_or_else(|| Problem::line(line, "the header has no known `format`; export the mesh again"))?;
+        .ok_or_else(|| Problem::line(line, "the header has no supported `format`; export the mesh again"))?;
     Ok(Header { encoding, elements, data: at, line })
 }
 
@@ -163,7 +163,7 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
         let axes = [place("x"), place("y"), place("z")];
         let is_vertex = element.name == "vertex";
         if is_vertex && axes.iter().any(Option::is_none) {
-            return Err(Problem::file("the vertices have no properties x, y and z; export the mesh again"));
+            return Err(Problem::file("the vertices lack the properties x, y and z; export the mesh again"));
         }
         if element.properties.is_empty() {
             continue;

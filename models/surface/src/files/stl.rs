@@ -1,12 +1,12 @@
-//! STL: loose triangles, as text or in binary32. A binary file may begin with `solid` too; its length decides.
+//! STL: triangle soup, as text or in binary32. A binary file may begin with `solid` as well, so its length decides.
 
 use super::bytes::{Cursor, Order, Scalar};
 use super::{NOT_FINITE, Problem, is_usable, next_index, text};
 use crate::soup::Soup;
 
-/// Bytes before the first triangle: a title and a count.
+/// Length of the header, bytes: a title and the number of triangles.
 const HEAD: usize = 84;
-/// Bytes of a triangle: a normal, three corners, two bytes of attributes.
+/// Size of a triangle, bytes: a normal, three corners, two bytes of attributes.
 const FACET: usize = 50;
 
 fn count(bytes: &[u8]) -> Option<usize> {
@@ -31,14 +31,14 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
         Some(count) => Err(Problem::byte(
             80,
             format!(
-                "the file says {count} triangles and has {} bytes, but a binary STL file of so many has {}; copy or export \
+                "the header gives {count} triangles, but the file has {} bytes instead of {}; copy or export \
                  the file again",
                 bytes.len(),
                 HEAD as u64 + FACET as u64 * count as u64
             ),
         )),
         None => Err(Problem::file(
-            "this is no STL file: it is shorter than 84 bytes and does not begin with `solid`",
+            "this is not an STL file: it is shorter than 84 bytes and does not begin with `solid`; name another file",
         )),
     }
 }
@@ -108,7 +108,7 @@ fn read_text(text: &str) -> Result<Soup, Problem> {
                 let other: String = other.chars().take(20).flat_map(char::escape_debug).collect();
                 return Err(Problem::line(
                     number,
-                    format!("`{other}` is no word of an STL file; export the mesh again"),
+                    format!("`{other}` is not an STL keyword; export the mesh again"),
                 ));
             }
         }

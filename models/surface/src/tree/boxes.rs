@@ -1,9 +1,9 @@
-//! Boxes along the axes, eight at a time, in binary32, rounded outwards.
+//! Axis-aligned boxes, eight at a time, in binary32, rounded outwards.
 
 use super::{WIDTH, above, below};
 use flotor_hal::DVec3;
 
-/// Eight boxes, by coordinate.
+/// Eight boxes, as arrays by coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Boxes {
@@ -28,7 +28,7 @@ impl Boxes {
         sum
     }
 
-    /// Returns true for each box that meets a box.
+    /// Returns true for each box that overlaps a given box.
     #[inline]
     pub(super) fn meets(&self, low: [f32; 3], high: [f32; 3]) -> [bool; WIDTH] {
         let mut all = [true; WIDTH];
@@ -40,7 +40,7 @@ impl Boxes {
         all
     }
 
-    /// Sets a box to contain two corners too, m.
+    /// Enlarges a box to contain two corners, m.
     pub(super) fn widen(&mut self, i: usize, [low_m, high_m]: [DVec3; 2]) {
         for k in 0..3 {
             self.low[k][i] = self.low[k][i].min(below(low_m[k]));
@@ -48,7 +48,7 @@ impl Boxes {
         }
     }
 
-    /// Returns the box about all eight, m.
+    /// Returns the bounding box of all eight, m.
     pub(super) fn all_m(&self) -> [DVec3; 2] {
         let end = |all: [[f32; WIDTH]; 3], of: fn(f32, f32) -> f32, start| {
             DVec3::from_array(all.map(|ends| f64::from(ends.into_iter().fold(start, of))))

@@ -1,4 +1,4 @@
-//! Flat cylinders, eight at a time: a ball that touches a smooth surface meets the boxes of many patches about the place, but few of
+//! Flat cylinders, eight at a time: a ball in contact with a smooth surface overlaps the boxes of many patches nearby, but few of
 //! their discs. Stored in binary32, rounded so that a disc contains its item.
 
 use super::{ROUNDING, WIDTH, above, narrow};
@@ -19,7 +19,7 @@ pub(crate) struct Disc {
 }
 
 impl Disc {
-    /// Returns a disc that contains all of `discs`, of which there is one or more.
+    /// Returns a disc that contains all of `discs`, one or more.
     fn about(discs: &[Self]) -> Self {
         let sum: DVec3 = discs.iter().map(|disc| disc.axis).sum();
         let axis = sum.try_normalize().unwrap_or(discs[0].axis);
@@ -46,7 +46,7 @@ fn wide(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
 
-/// Eight discs, by coordinate. Four lines of a cache.
+/// Eight discs, as arrays by coordinate; four cache lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Discs {
@@ -57,7 +57,7 @@ pub(super) struct Discs {
 }
 
 impl Discs {
-    /// Without discs: at an infinite distance from everything.
+    /// No discs: the distance to any point is infinite.
     pub(super) const EMPTY: Self = Self {
         middle: [[0.0; WIDTH]; 3],
         axis: [[0.0; WIDTH]; 3],
@@ -79,14 +79,14 @@ impl Discs {
         for k in 0..3 {
             (self.middle[k][i], self.axis[k][i]) = (middle[k], axis[k]);
         }
-        // What rounding moves, the disc contains too.
+        // Enlarge the disc by the rounding error of its middle.
         let moved_m = (wide(middle) - disc.middle_m).length();
         let turned_m = (wide(axis) - disc.axis).length() * (disc.radius_m + disc.half_m);
         self.radius[i] = above(disc.radius_m + moved_m + 2.0 * turned_m);
         self.half[i] = above(disc.half_m + moved_m + 2.0 * turned_m);
     }
 
-    /// Returns a disc as stored; `None` for an empty place.
+    /// Returns a stored disc; `None` for an empty slot.
     fn get(&self, i: usize) -> Option<Disc> {
         let one = |all: &[[f32; WIDTH]; 3]| wide([all[0][i], all[1][i], all[2][i]]);
         let axis = one(&self.axis).try_normalize()?;
@@ -94,7 +94,7 @@ impl Discs {
         Some(Disc { middle_m: one(&self.middle), axis, radius_m, half_m })
     }
 
-    /// Returns a disc about all of this node.
+    /// Returns a disc that contains all discs of this node.
     pub(super) fn disc(&self) -> Option<Disc> {
         let first = self.get(0)?;
         let mut all = [first; WIDTH];
@@ -129,7 +129,7 @@ impl Discs {
         squares
     }
 
-    /// Returns true for each disc whose box may meet a box.
+    /// Returns true for each disc whose bounding box may overlap a given box.
     #[inline]
     pub(super) fn meets(&self, low: [f32; 3], high: [f32; 3]) -> [bool; WIDTH] {
         let mut all = [true; WIDTH];

@@ -1,8 +1,8 @@
-//! Order of points along a curve that fills space: points of one stretch lie close together.
+//! Order of points along a space-filling curve: neighbours in the order are close in space.
 
 use flotor_hal::DVec3;
 
-/// Returns the order of points along Hilbert's curve in their box. Not real-time.
+/// Returns the order of points along Hilbert's curve in their bounding box. Not real-time.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 0 to 2^20, fewer than 2^32 points
 pub(crate) fn hilbert_order(points_m: &[DVec3]) -> Vec<u32> {
@@ -23,7 +23,7 @@ pub(crate) fn hilbert_order(points_m: &[DVec3]) -> Vec<u32> {
     keys.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Returns the place of a cell along Hilbert's curve (Skilling 2004, AIP Conf. Proc. 707, 381).
+/// Returns the index of a cell along Hilbert's curve (Skilling 2004, AIP Conf. Proc. 707, 381).
 fn hilbert_key(mut x: [u32; 3], bits: u32) -> u64 {
     let mut q = 1 << (bits - 1);
     while q > 1 {

@@ -1,4 +1,4 @@
-//! Tree over the patches: eight children a node, packed bottom-up over patches sorted along Hilbert's curve.
+//! Bounding-volume tree of the patches: eight children per node, packed bottom-up over patches sorted along Hilbert's curve.
 //!
 //! No pointers: the children of node `i` of a level are nodes `8 i` to `8 i + 7` of the level below, and of the lowest level patches.
 //! The two lowest levels have discs, the others boxes, in binary32; distances are computed in binary32, with a margin.
@@ -14,15 +14,15 @@ use discs::Discs;
 use flotor_hal::DVec3;
 pub(crate) use hilbert::hilbert_order;
 
-/// Children of a node.
+/// Number of children of a node.
 const WIDTH: usize = 8;
-/// Levels of discs.
+/// Number of levels with discs.
 const DISC_LEVELS: usize = 2;
-/// Most levels: eight to this power is more than the number of patches that is read.
+/// Maximum number of levels: eight to this power exceeds the maximum number of patches.
 const MOST_LEVELS: usize = 10;
 /// Size of the stack of a traversal.
 const STACK: usize = WIDTH * MOST_LEVELS;
-/// Rounding of a few operations in binary32, relative: eight units in the last place.
+/// Relative rounding error of a few operations in binary32: eight units in the last place.
 const ROUNDING: f32 = 1.0e-6;
 
 #[allow(clippy::cast_possible_truncation)] // rounded outwards
@@ -48,7 +48,7 @@ pub(crate) struct Tree {
     /// Levels of boxes, from the lowest to the root; none for a few items.
     boxes: Vec<Vec<Boxes>>,
     count: usize,
-    /// Rounding of a coordinate to binary32 near the items, m.
+    /// Rounding error of a coordinate near the items in binary32, m.
     rounding_m: f32,
 }
 
@@ -73,7 +73,7 @@ impl Tree {
             below = upper[0].len();
         }
         let mut lowest = vec![Boxes::EMPTY; below.div_ceil(WIDTH)];
-        // Items under one box of the lowest level of boxes.
+        // Number of items below one box of the lowest level of boxes.
         let share = [WIDTH; DISC_LEVELS].iter().product::<usize>();
         fill(&mut lowest, |node| {
             let mut boxes = Boxes::EMPTY;
@@ -96,7 +96,7 @@ impl Tree {
         Self { discs, boxes, count, rounding_m: above(largest * 2.4e-7) }
     }
 
-    /// Returns the number of bytes.
+    /// Returns the memory of the tree, bytes.
     #[must_use]
     pub(crate) fn bytes(&self) -> usize {
         let boxes: usize = self.boxes.iter().map(Vec::len).sum();
@@ -104,7 +104,7 @@ impl Tree {
         boxes * size_of::<Boxes>() + discs * size_of::<Discs>()
     }
 
-    /// Number of the level of the root.
+    /// Returns the index of the root's level.
     fn top(&self) -> u32 {
         u32::try_from(DISC_LEVELS + self.boxes.len()).unwrap_or(0) - 1
     }
@@ -119,8 +119,8 @@ impl Tree {
         }
     }
 
-    /// Visits the items nearer to `c_m` than the bound, nearest first as far as the tree knows; `visit` returns the new bound, m.
-    /// Real-time: bounded, no allocation.
+    /// Visits the items that may be nearer to `c_m` than the bound, approximately nearest first; `visit` returns the new bound,
+    /// m. Real-time: bounded, no allocation.
     pub(crate) fn nearest(&self, c_m: DVec3, bound_m: f64, mut visit: impl FnMut(usize) -> f64) {
         let c = narrow(c_m);
         let limit = |bound_m: f64| {
@@ -153,7 +153,7 @@ impl Tree {
                         most = most.min(limit(visit(item as usize)));
                     }
                 } else if used < STACK {
-                    // Farthest first: the stack returns the nearest.
+                    // Push the farthest first, so that the nearest is popped first.
                     let mut place = used;
                     while place > base && stack[place - 1].2 < squares[child] {
                         stack[place] = stack[place - 1];
@@ -166,7 +166,8 @@ impl Tree {
         }
     }
 
-    /// Visits the items from number `first` on that the box of a segment may meet. Real-time: bounded, no allocation.
+    /// Visits the items with an index of at least `first` that may overlap the bounding box of a segment. Real-time: bounded, no
+    /// allocation.
     pub(crate) fn along(&self, from_m: DVec3, to_m: DVec3, first: usize, mut visit: impl FnMut(usize)) {
         if self.count == 0 {
             return;
@@ -183,7 +184,7 @@ impl Tree {
                 Some(discs) => discs[index as usize].meets(low, high),
                 None => self.boxes[level as usize - DISC_LEVELS][index as usize].meets(low, high),
             };
-            // Items below one child.
+            // Number of items below one child.
             let share = WIDTH.pow(level);
             for child in (0..WIDTH).filter(|child| meets[*child]) {
                 #[allow(clippy::cast_possible_truncation)] // 0 to 7

@@ -51,7 +51,7 @@ pub(super) fn analysis(analysis: &DesignAnalysis) -> String {
     if !analysis.omitted.is_empty() {
         lines.push(String::new());
         lines.push(format!(
-            "  without a measure in some condition, and not in the effects: {}",
+            "  excluded from the effects, without a measure in some condition: {}",
             analysis.omitted.join(", ")
         ));
     }

@@ -251,7 +251,7 @@ fn changed(before: &str, after: &str) -> String {
     if without_blanks(before) == without_blanks(after) {
         let lines = before.split('\n').zip(after.split('\n'));
         let same = lines.take_while(|(one, other)| one == other).count();
-        return format!(": line {} on, in blanks or line ends only", same + 1);
+        return format!(": from line {} on, only blanks or line ends differ", same + 1);
     }
     let [before, after] = [before, after].map(|text| text.lines().collect::<Vec<_>>());
     let same = before.iter().zip(&after).take_while(|(one, other)| one == other).count();
@@ -262,7 +262,7 @@ fn changed(before: &str, after: &str) -> String {
         let lines = lines.get(same..lines.len() - same_end).unwrap_or_default().join("; ");
         if lines.is_empty() { "nothing".to_owned() } else { format!("`{lines}`") }
     };
-    format!(": line {} on had {}, and has {} now", same + 1, middle(&before), middle(&after))
+    format!(": from line {} on: {}, now {}", same + 1, middle(&before), middle(&after))
 }
 
 /// Describes a changed part of the configuration with its first difference; `None` if the part is equal.

@@ -304,16 +304,16 @@ fn a_sitting_of_another_study_says_where_it_differs() {
     let (one, other) = (Begin { plan: plan("a"), ..begin() }, Begin { plan: plan("b"), ..begin() });
     assert!(one.differs(&one.clone()).is_none());
     for (before, after, expected) in [
-        ("a", "b", "line 1 on had `a`, and has `b` now"),
+        ("a", "b", "from line 1 on: `a`, now `b`"),
         (
             "x\nbases = [17, 26]\ny",
             "x\nbases = [17]\ny",
-            "line 2 on had `bases = [17, 26]`, and has `bases = [17]` now",
+            "from line 2 on: `bases = [17, 26]`, now `bases = [17]`",
         ),
-        ("x\ny", "x\nseed = 2\ny", "line 2 on had nothing, and has `seed = 2` now"),
-        ("x\ny\nz", "x\nz", "line 2 on had `y`, and has nothing now"),
-        ("x\n  y\nz", "x\n  z\nz", "line 2 on had `  y`, and has `  z` now"),
-        ("x\n\n y", "x\nz\n y", "line 2 on had nothing, and has `z` now"),
+        ("x\ny", "x\nseed = 2\ny", "from line 2 on: nothing, now `seed = 2`"),
+        ("x\ny\nz", "x\nz", "from line 2 on: `y`, now nothing"),
+        ("x\n  y\nz", "x\n  z\nz", "from line 2 on: `  y`, now `  z`"),
+        ("x\n\n y", "x\nz\n y", "from line 2 on: nothing, now `z`"),
     ] {
         let (one, other) = (Begin { plan: plan(before), ..begin() }, Begin { plan: plan(after), ..begin() });
         let said = other.differs(&one).expect("another file");
@@ -331,7 +331,7 @@ fn a_sitting_of_another_study_says_where_it_differs() {
         let said = other.differs(&one).expect("another file");
         let line = if after.ends_with('1') { 3 } else { 2 };
         let expected =
-            format!("another version of a.study.toml: line {line} on, in blanks or line ends only");
+            format!("another version of a.study.toml: from line {line} on, only blanks or line ends differ");
         assert_eq!(said, format!("begun with {expected}"), "{after:?}");
     }
     // Logs of early versions have the digest alone; another name is not another file.

@@ -37,7 +37,7 @@ pub enum ReplyError {
     /// The answer does not fit the question.
     #[error("the answer is not one of those offered at this step; give one of these")]
     Answer(Answer),
-    /// The confidence is missing, is not on its scale, or is no part of the question.
+    /// The confidence is missing, is not on its scale, or is not a part of the question.
     #[error("{}; give a point of the scale of confidence, where the question has one", match .0 {
         Some(given) => format!("the confidence {given} is not expected here"),
         None => "the confidence is missing".to_owned(),

@@ -25,7 +25,7 @@ fn check_name(draft: &Draft) -> Result<(), DesignError> {
         return Ok(());
     }
     let problem = format!(
-        "`{}` is no name for files; write 1 to 30 lower-case letters and digits, like delay2",
+        "`{}` is not a valid study name; write 1 to 30 lower-case letters and digits, like delay2",
         draft.study
     );
     Err(DesignError::new("study", &problem))
@@ -58,26 +58,32 @@ fn check_factors(draft: &Draft) -> Result<(), DesignError> {
         let earlier = || draft.factors.iter().take(index);
         let is_name = |one: char| one.is_ascii_lowercase() || one.is_ascii_digit() || one == '_';
         if name.is_empty() || !name.chars().all(is_name) {
-            let problem = format!("`{name}` is no name of a column; write lower-case letters, digits and _");
+            let problem =
+                format!("`{name}` is not a valid column name; write lower-case letters, digits and _");
             return Err(DesignError::new("factor.name", &problem));
         }
         if COLUMNS.contains(&name.as_str()) || earlier().any(|other| other.name == *name) {
-            return Err(DesignError::new(&key(""), "the name is taken by another column; rename the factor"));
+            return Err(DesignError::new(&key(""), "another column has this name; rename the factor"));
         }
         if values.is_empty() {
-            return Err(DesignError::new(&key(".values"), "no level; write at least one"));
+            return Err(DesignError::new(&key(".values"), "the factor has no level; write at least one"));
         }
         let is_right =
             |value: &Value| value.is_usable() && values.iter().filter(|other| *other == value).count() == 1;
         if let Some(wrong) = values.iter().find(|value| !is_right(value)) {
             return Err(DesignError::new(
                 &key(".values"),
-                &format!("{wrong}: write each level once, numbers finite"),
+                &format!(
+                    "level {wrong} is listed twice or not finite; write each level once, as a finite number or a word"
+                ),
             ));
         }
         let numbers = values.iter().filter(|value| value.number().is_some()).count();
         if numbers != 0 && numbers != values.len() {
-            return Err(DesignError::new(&key(".values"), "numbers and words are mixed; write one kind"));
+            return Err(DesignError::new(
+                &key(".values"),
+                "the levels mix numbers and words; write only numbers or only words",
+            ));
         }
         match setting {
             None if standard != Some(name) => {
@@ -90,7 +96,7 @@ fn check_factors(draft: &Draft) -> Result<(), DesignError> {
                     !matches!(value, Value::Choice(word) if [Setting::SHOWN, Setting::HIDDEN].contains(&word.as_str()))
                 });
                 if let Some(wrong) = wrong {
-                    let problem = format!("`{wrong}` is no state of the picture; write shown or hidden");
+                    let problem = format!("`{wrong}` is not a state of the picture; write shown or hidden");
                     return Err(DesignError::new(&key(".values"), &problem));
                 }
             }
@@ -132,10 +138,10 @@ fn check_blocks(draft: &Draft) -> Result<(), DesignError> {
         let problem = match factor {
             None => format!("there is no factor `{name}`; write names of factors"),
             Some(factor) if factor.vary != Vary::Within => {
-                format!("`{name}` varies between subjects and is constant anyway; remove it")
+                format!("`{name}` varies between subjects, so it is constant in every block; remove it")
             }
             Some(_) if by.iter().take(index).any(|other| other == name) => {
-                format!("`{name}` is there twice; remove one")
+                format!("`{name}` is listed twice; remove one")
             }
             Some(_) => continue,
         };
@@ -175,7 +181,7 @@ fn check_task(draft: &Draft) -> Result<(), DesignError> {
     {
         return Err(DesignError::new(
             "task.absent_share",
-            &format!("{absent_share}: write a share from 0 to below 1"),
+            &format!("the share is {absent_share}; write a share from 0 to below 1"),
         ));
     }
     let fits = match method {
@@ -203,23 +209,23 @@ fn check_stimulus(draft: &Draft) -> Result<(), DesignError> {
     match stimulus {
         None => {
             if matches!(task.ask, Ask::Choice { .. } | Ask::Detection { .. }) {
-                let problem = "the question needs what differs; write a table [stimulus]";
+                let problem = "the question needs a stimulus that differs; write a table [stimulus]";
                 return Err(DesignError::new("stimulus", problem));
             }
             if levels.is_some() {
-                let problem = "levels without a stimulus; write a table [stimulus], or remove the levels";
+                let problem = "the method has levels, but the study has no stimulus; write a table [stimulus], or remove the levels";
                 return Err(DesignError::new("method.levels", problem));
             }
             Ok(())
         }
         Some(Stimulus::Categorical { present, absent, .. }) => {
             if levels.is_some() {
-                let problem = "two choices have no levels; write kind = \"constant\" with repetitions only";
+                let problem = "a stimulus of two choices has no levels; write kind = \"constant\" with repetitions only";
                 return Err(DesignError::new("method.kind", problem));
             }
             if present == absent || !present.is_usable() || !absent.is_usable() {
                 let problem =
-                    format!("present is `{present}`, absent `{absent}`; write two different values");
+                    format!("present is `{present}` and absent is `{absent}`; write two different values");
                 return Err(DesignError::new("stimulus.present", &problem));
             }
             Ok(())
@@ -233,13 +239,14 @@ fn check_stimulus(draft: &Draft) -> Result<(), DesignError> {
                 Side::Below => -most,
             };
             if *scale == Scale::Share && lowest <= -1.0 {
-                let problem = "a value of 0 or on the other side of 0; write shares above -1, and below 1 with side = \"below\"";
+                let problem = "the value of a level is 0 or has the opposite sign; write shares above -1, and below 1 with side = \"below\"";
                 return Err(DesignError::new("method.levels", problem));
             }
             if let (Scale::Share, Standard::Number(number)) = (scale, standard)
                 && *number == 0.0
             {
-                let problem = "a share of 0 is 0; write another standard, or scale = \"difference\"";
+                let problem =
+                    "shares of a standard of 0 are 0; write another standard, or scale = \"difference\"";
                 return Err(DesignError::new("stimulus.standard", problem));
             }
             if matches!(method, Method::QuestPlus { .. }) && *scale != Scale::Share {

@@ -7,7 +7,10 @@ pub(super) fn different(key: &str, levels: &[f64]) -> Result<(), DesignError> {
     let is_right =
         |level: f64| level.is_finite() && levels.iter().filter(|other| **other == level).count() == 1;
     levels.iter().find(|level| !is_right(**level)).map_or(Ok(()), |wrong| {
-        Err(DesignError::new(key, &format!("{wrong}: write finite levels, each once")))
+        Err(DesignError::new(
+            key,
+            &format!("level {wrong} is listed twice or not finite; write finite levels, each once"),
+        ))
     })
 }
 

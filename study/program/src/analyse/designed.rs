@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &AnalyseArguments, data: &DesignedData) -> Result<(
     for log in logs.iter().filter(|log| !log.complete) {
         let session = log.begin.session;
         note(format_args!(
-            "{}, session {}: incomplete after {} steps; what is there counts",
+            "{}, session {}: incomplete after {} steps; its answers are included",
             session.subject,
             session.session,
             log.steps.len()

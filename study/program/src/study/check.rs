@@ -35,7 +35,7 @@ pub(super) struct CheckArguments {
     /// Study file with a design (default: the only NAME.study.toml in this folder)
     #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Number of simulated studies for the power, 0: no power
+    /// Number of simulated studies for the power analysis; 0: no power analysis
     #[arg(long, default_value_t = 200, value_parser = count(0..=100_000_u32), value_name = "N")]
     runs: u32,
     /// Number of subjects (default: that of the file, or 16)

@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
-/// Options whose values are paths, relative to the folder of the study file; the name of one of Flotor's own scenes is no path.
+/// Options whose values are paths, relative to the folder of the study file; the name of one of Flotor's own scenes is not a path.
 const PATHS: [&str; 6] = ["out", "scene", "consent", "instructions", "texts", "plugin-path"];
 /// Options that are only valid on the command line of `study run`.
 const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];

@@ -158,7 +158,7 @@ impl Controller {
         }
     }
 
-    /// Rejects and counts received data that is no packet.
+    /// Rejects and counts received data that is not a packet.
     pub fn receive_malformed(&mut self) {
         self.intake.reject(Rejection::Length);
     }

@@ -17,7 +17,7 @@ use std::io;
 use std::os::windows::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-/// Returns the folder for the runs of this user if `XDG_RUNTIME_DIR` is no folder.
+/// Returns the folder for the runs of this user if `XDG_RUNTIME_DIR` is not a folder.
 pub(crate) fn run_folder() -> PathBuf {
     let local = std::env::var_os("LOCALAPPDATA").map(PathBuf::from).filter(|path| path.is_absolute());
     local.unwrap_or_else(std::env::temp_dir).join("flotor").join("run")

@@ -153,8 +153,7 @@ impl AsynchronousModel {
         stepped
     }
 
-    /// Returns what the hand at a port has felt of the stiffness of contacts so far, in the model frame. Real-time: bounded, no
-    /// allocation.
+    /// Returns the reductions of contact stiffness at a port so far, in the model frame. Real-time: bounded, no allocation.
     pub fn felt_stiffness(&self, port: usize) -> FeltStiffness {
         self.answers.get(port).map(NewestAnswer::felt_stiffness).unwrap_or_default()
     }

@@ -42,7 +42,7 @@ pub(crate) struct SharedPage {
     pub(super) message: [AtomicU8; MESSAGE_BYTES],
 }
 
-/// The same memory mapped so many times; `None`, and said so, where the system has none to share.
+/// Maps the same memory `TIMES` times; prints a note and returns `None` if the system has no shared memory.
 #[cfg(test)]
 pub(super) fn mapped<const TIMES: usize>() -> Option<[SharedMemory; TIMES]> {
     match create_file() {

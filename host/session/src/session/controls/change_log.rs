@@ -33,7 +33,9 @@ impl ChangeLog {
             if report.change.parameter == PLUGIN {
                 self.plugins.set_current(report.change.plugin, report.change.generation);
             }
-            observer.change(&self.plugins.describe(&report));
+            if observer.reads_changes() {
+                observer.change(&self.plugins.describe(&report));
+            }
         }
     }
 }

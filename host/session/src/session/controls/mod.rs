@@ -34,6 +34,9 @@ pub struct Controls {
     shared: Arc<Shared>,
 }
 
+/// Live numbers of a run, resolved: the changes of each.
+pub struct LiveNumbers(Vec<Vec<ParameterChange>>);
+
 struct Shared {
     plugins: PluginTable,
     /// Queue to the loop; locked by the threads that change the run, never by the loop.
@@ -96,6 +99,30 @@ impl Controls {
     pub fn set_parameters_at_once(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
         let checked = values.iter().map(|value| self.shared.plugins.check(value));
         self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    /// Returns live numbers of the run, each by plugin and parameter, for changes in quick succession. Not real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]: unknown plugin or parameter, a parameter that is not live, or not a number that may be 0.
+    pub fn numbers(&self, names: &[(&str, &str)]) -> Result<LiveNumbers, ControlError> {
+        let check = |(plugin, parameter): &(&str, &str)| {
+            self.shared.plugins.check(&NewValue { plugin, parameter, value: "0" })
+        };
+        Ok(LiveNumbers(names.iter().map(check).collect::<Result<_, _>>()?))
+    }
+
+    /// Sets live numbers before the same tick, without a gradual change, as [`Controls::set_parameters_at_once`] does; the plugin
+    /// refuses a value out of range. Not real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]: queue to the loop full, or run over.
+    pub fn set_numbers(&self, numbers: &LiveNumbers, values: &[f64]) -> Result<(), ControlError> {
+        let each = numbers.0.iter().zip(values);
+        let change = |(changes, value): (&Vec<ParameterChange>, &f64)| {
+            changes.iter().map(|change| ParameterChange { value: *value, ..*change }).collect::<Vec<_>>()
+        };
+        self.send(&each.flat_map(change).collect::<Vec<_>>())
     }
 
     /// Sets the target weight of a model, clamped to 0 to 1, which the loop approaches at the rate of the model's fade from the

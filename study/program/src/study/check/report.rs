@@ -8,7 +8,7 @@ use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_study_design::design::Design;
 use serde::Serialize;
 
-/// What a study file does.
+/// Preview of a study file.
 #[derive(Serialize)]
 pub(super) struct Check {
     pub(super) study: String,

@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 /// Balance of a study over all its subjects; each range is the smallest and the largest count.
 #[derive(Serialize)]
 pub(super) struct Balance {
-    /// How often each block condition is at each place.
+    /// Smallest and largest number of times that a block condition is at a place of the order.
     pub(super) at_each_place: [usize; 2],
-    /// How often each block condition follows each other one.
+    /// Smallest and largest number of times that a block condition follows another one.
     pub(super) after_each_other: [usize; 2],
-    /// How many subjects each combination of levels between subjects has.
+    /// Smallest and largest number of subjects for a combination of levels between subjects.
     pub(super) subjects_in_each_group: [usize; 2],
     /// Share of the pairs whose comparison is first; `None` without pairs.
     pub(super) comparison_first: Option<f64>,

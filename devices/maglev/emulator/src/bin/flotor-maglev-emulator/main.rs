@@ -192,7 +192,7 @@ fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     let mut clients = Clients::of(listen(arguments, tcp::PORT)?)?;
     loop {
         let stream = clients.wait_for_one()?;
-        // A client that has already disconnected is no error.
+        // A client that has already disconnected is not an error.
         let (Ok(from), Ok(stream)) = (stream.peer_addr(), prepared(stream)) else { continue };
         say(&format!("connected {from}"));
         let mut link = ServedHost { link: StreamLink::new(stream), tenure: Tenure::begin(&mut clients) };

@@ -13,10 +13,10 @@ use flotor_maglev::ml_api::{
 /// Effect of a force command on the gains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ForceCommand {
-    /// Its force replaces the force of the gains.
+    /// Replacement: the commanded force replaces the force of the gains.
     #[value(name = "replace")]
     Replaces,
-    /// Its force is added to the force of the gains.
+    /// Addition: the commanded force is added to the force of the gains.
     #[value(name = "add")]
     Adds,
 }

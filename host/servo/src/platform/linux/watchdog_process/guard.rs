@@ -54,7 +54,7 @@ pub fn serve(host: i32) -> io::Result<()> {
                 }
             }
             (Some(Packet::Begin), _) => break,
-            // The host has ended before any device was energised, or the other end is no host.
+            // The host has ended before any device was energised, or the other end is not a host.
             _ => return Err(io::Error::other("the host passed no devices")),
         }
     }

@@ -1,35 +1,39 @@
 //! Tick statistics of a run for its summary, from the tick records, in constant memory.
 
-use crate::Observer;
-use flotor_core::feel::Feel;
-use flotor_core::trace::{Events, TickRecord};
+use crate::feel::Feel;
+use crate::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Demand, GripKind};
 
-/// Observer that collects the tick statistics for the summary of a run.
+/// Tick statistics of a run, from the records of all its ticks.
 #[derive(Default)]
 pub struct Tally {
     /// Statistics of each device, by number.
-    pub(crate) devices: Vec<DeviceTally>,
+    pub devices: Vec<DeviceTally>,
     event_ticks: [u64; Events::NAMES.len()],
     /// Events of the current tick, at any device.
     events: Events,
     generated_peak_j: f64,
-    pub(crate) port_lowest_j: f64,
+    /// Lowest net energy put in by the hands at all ports together, J.
+    pub port_lowest_j: f64,
     /// Model outputs that were computed in every tick at every device; `None` before the first tick.
-    pub(crate) computed: Option<Demand>,
+    pub computed: Option<Demand>,
 }
 
 /// Tick statistics of one device, from its records.
 #[derive(Default)]
-pub(crate) struct DeviceTally {
-    pub(crate) peak_force_n: f64,
-    pub(crate) peak_torque_nm: f64,
+pub struct DeviceTally {
+    /// Largest commanded force, N.
+    pub peak_force_n: f64,
+    /// Largest commanded torque, N·m.
+    pub peak_torque_nm: f64,
     /// Largest magnitude of the commanded effort at the grip, N or N·m.
     peak_effort: f64,
     last: Option<TickRecord>,
     balance: LoopBalance,
-    pub(crate) port_lowest_j: f64,
-    pub(crate) feel: Feel,
+    /// Lowest net energy put in by the hand at the port, J.
+    pub port_lowest_j: f64,
+    /// Stiffness and settling time that the hand felt.
+    pub feel: Feel,
 }
 
 impl DeviceTally {
@@ -45,12 +49,15 @@ impl DeviceTally {
     }
 
     /// Returns the largest effort at a grip of this kind; `None` without one.
-    pub(crate) fn peak_effort(&self, kind: GripKind) -> Option<f64> {
+    #[must_use]
+    pub fn peak_effort(&self, kind: GripKind) -> Option<f64> {
         let grip = self.last.as_ref()?.grip?;
         (grip.state.kind() == kind).then_some(self.peak_effort)
     }
 
-    pub(crate) fn port_energy_j(&self) -> f64 {
+    /// Returns the net energy put in by the hand at the port up to the last record, J.
+    #[must_use]
+    pub fn port_energy_j(&self) -> f64 {
         self.last.as_ref().map_or(0.0, |record| record.port_energy_j)
     }
 }
@@ -88,7 +95,8 @@ impl LoopBalance {
 
 impl Tally {
     /// Returns the number of ticks with each event, at any device.
-    pub(crate) fn event_ticks(&self) -> [u64; Events::NAMES.len()] {
+    #[must_use]
+    pub fn event_ticks(&self) -> [u64; Events::NAMES.len()] {
         std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
     }
 
@@ -101,19 +109,19 @@ impl Tally {
 
     /// Returns the largest energy that the loops of all devices together have generated at any time, J; `None` if it is not known to
     /// the end.
-    pub(crate) fn generated_peak_j(&self) -> Option<f64> {
+    #[must_use]
+    pub fn generated_peak_j(&self) -> Option<f64> {
         let is_known = self.devices.iter().all(|device| device.balance.generated_j.is_some());
         is_known.then_some(self.generated_peak_j)
     }
 
     /// Returns the largest value over all devices; 0 without a device.
-    pub(crate) fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
+    pub fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
         self.devices.iter().map(number).fold(0.0, f64::max)
     }
-}
 
-impl Observer for Tally {
-    fn observe(&mut self, record: &TickRecord) {
+    /// Adds the record of a tick at one device: tick after tick, and within a tick device after device. Not real-time.
+    pub fn add(&mut self, record: &TickRecord) {
         if record.device == 0 {
             // The previous tick is complete.
             self.event_ticks = self.event_ticks();

@@ -24,8 +24,8 @@
 //! A run ends in the last three states, and an emergency stop latches: force returns only with a new run, which opens and activates
 //! the device anew. A fault may still become an emergency stop, never the other way round.
 
-use flotor_core::fade;
-use flotor_core::trace::Events;
+use crate::fade;
+use crate::trace::Events;
 use flotor_hal::Fault;
 
 /// Source of an emergency stop.
@@ -47,7 +47,7 @@ pub enum EmergencySource {
 
 impl EmergencySource {
     /// All sources, in the order of their codes.
-    pub(crate) const ALL: [EmergencySource; 6] =
+    pub const ALL: [EmergencySource; 6] =
         [Self::Key, Self::Signal, Self::Latch, Self::Watcher, Self::Button, Self::Device];
 
     /// Returns the source as text for users.

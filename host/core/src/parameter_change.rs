@@ -1,6 +1,6 @@
 //! Changes of parameters, and reports on changes.
 
-use flotor_core::{ChangeOutcome, PluginIndex};
+use crate::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 
 /// Parameter number that stands for the weight of a model.
@@ -8,7 +8,7 @@ pub const WEIGHT: u32 = u32::MAX;
 /// Parameter number that stands for the plugin itself, in a report on its replacement; the value is the new generation.
 pub const PLUGIN: u32 = u32::MAX - 1;
 
-/// New value of a parameter. The numbers of plugin and parameter come from a schema: see `session::Controls`.
+/// New value of a parameter. The numbers of plugin and parameter come from a schema: see `Controls` of `flotor-session`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterChange {
     /// Number of the plugin in the run.
@@ -52,8 +52,9 @@ pub struct ChangeReport {
 }
 
 impl ChangeReport {
-    /// Creates a report on a change before a tick.
-    pub(super) fn at(tick: &Tick, change: ParameterChange, outcome: ChangeOutcome) -> Self {
+    /// Creates a report on a change before a tick. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn at(tick: &Tick, change: ParameterChange, outcome: ChangeOutcome) -> Self {
         Self { tick: tick.index, time_ns: tick.time_ns, change, outcome }
     }
 }

@@ -1,7 +1,7 @@
 //! Gradual changes: numbers move to a new value at a rate, so that a user's slider does not make the force jump.
 
-use super::change::{Pace, ParameterChange};
-use flotor_core::{ChangeOutcome, PluginIndex};
+use crate::parameter_change::{Pace, ParameterChange};
+use crate::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 
 /// Longest time step of a movement in a tick, ns: missed ticks are not caught up.
@@ -38,25 +38,35 @@ impl Known {
 }
 
 /// Changed parameters with their values, including the parameters in a gradual change.
-pub(super) struct Movements {
+pub struct Movements {
     known: Vec<Known>,
     moving: usize,
 }
 
 impl Movements {
+    /// Copies the list to memory of the same capacity. Not real-time.
+    #[must_use]
+    pub fn save(&self) -> Self {
+        let mut copy = Self::with_room(self.known.capacity());
+        copy.known.extend_from_slice(&self.known);
+        Self { moving: self.moving, ..copy }
+    }
+
     /// Creates an empty list with preallocated memory for `parameters` numbers. Not real-time.
-    pub(super) fn with_room(parameters: usize) -> Self {
+    #[must_use]
+    pub fn with_room(parameters: usize) -> Self {
         Self { known: Vec::with_capacity(parameters), moving: 0 }
     }
 
     /// Returns the number of movements. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn moving(&self) -> usize {
+    #[must_use]
+    pub fn moving(&self) -> usize {
         self.moving
     }
 
     /// Records an applied change without a rate, which ends a movement of the number. Real-time: bounded, no allocation.
-    pub(super) fn note(&mut self, change: &ParameterChange, outcome: ChangeOutcome) {
+    pub fn note(&mut self, change: &ParameterChange, outcome: ChangeOutcome) {
         if outcome == ChangeOutcome::Applied {
             self.keep(change, change.value, None);
         }
@@ -64,7 +74,7 @@ impl Movements {
 
     /// Starts a movement from the number's recorded value, else from `from`; returns false if there is no room. Real-time: bounded,
     /// no allocation.
-    pub(super) fn begin(&mut self, change: &ParameterChange, from: f64, per_s: f64) -> bool {
+    pub fn begin(&mut self, change: &ParameterChange, from: f64, per_s: f64) -> bool {
         self.keep(change, from, Some((change.value, per_s)))
     }
 
@@ -87,7 +97,7 @@ impl Movements {
 
     /// Advances all movements by a tick: `apply` makes each change; `report` receives each change made, and each movement that
     /// ended short of its target. Real-time: bounded by the numbers and `apply`, no allocation.
-    pub(super) fn advance(
+    pub fn advance(
         &mut self,
         tick: &Tick,
         mut apply: impl FnMut(&ParameterChange) -> ChangeOutcome,
@@ -117,7 +127,7 @@ impl Movements {
     }
 
     /// Drops the numbers of a plugin's other generations after a replacement. Real-time: bounded, no allocation.
-    pub(super) fn forget_others(&mut self, plugin: PluginIndex, generation: u16) {
+    pub fn forget_others(&mut self, plugin: PluginIndex, generation: u16) {
         self.known.retain(|known| known.plugin != plugin || known.generation == generation);
         self.count();
     }
