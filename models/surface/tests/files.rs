@@ -414,3 +414,21 @@ fn a_unit_is_guessed_and_told() {
     let inch = Reading { unit: Unit::Inch, ..READING };
     assert!((size_mm(ball(1.0), &inch).0 - 0.0254 * in_m).abs() < 1.0e-6);
 }
+
+#[test]
+fn a_cavity_below_an_edge_of_the_outer_faces_stays_a_cavity() {
+    // The first corner of the cavity lies below diagonals and below an edge between two squares.
+    for (low, high) in [
+        (DVec3::splat(-0.005), DVec3::splat(0.005)),
+        (DVec3::new(0.0, 0.0, -0.005), DVec3::splat(0.005)),
+        (DVec3::new(0.0, -0.003, -0.005), DVec3::splat(0.005)),
+    ] {
+        let mut soup = cuboid(DVec3::splat(-0.01), DVec3::splat(0.01), 2);
+        let first = soup.points.len() as u32;
+        let cavity = cuboid(low, high, 1);
+        soup.points.extend(cavity.points);
+        soup.triangles.extend(cavity.triangles.iter().map(|[a, b, c]| [a + first, c + first, b + first]));
+        let object = read("m.obj", obj(&soup), &READING).expect("a mesh");
+        assert!(object.remarks.iter().all(|remark| !remark.contains("reversed")), "{:?}", object.remarks);
+    }
+}
