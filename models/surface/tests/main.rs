@@ -9,3 +9,4 @@ mod files;
 mod search;
 mod shapes;
 mod smooth;
+mod walls;
