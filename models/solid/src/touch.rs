@@ -25,8 +25,6 @@ struct Cell {
 #[derive(Clone, Debug)]
 pub struct Zone {
     cells: Vec<Cell>,
-    /// Points of the touched surface at fixed nodes, which no cell has, m.
-    fixed_m: Vec<[f64; 3]>,
     /// Mean displacement of a cell under an even unit load on a cell, m/N; three components a cell, symmetric.
     compliance: Vec<f64>,
 }
@@ -95,7 +93,7 @@ impl Zone {
     ) -> Result<Self, NotPositive> {
         let mut refined: Refinement = body.base.clone();
         refined.refine(grading);
-        let (cells, fixed): (Vec<Cell>, Vec<Cell>) = refined
+        let cells: Vec<Cell> = refined
             .leaves()
             .flat_map(|(leaf, _)| refined.touched(leaf))
             .map(|nodes| Cell::new(&refined.nodes_m, nodes))
@@ -103,9 +101,9 @@ impl Zone {
                 let near = |at: [f64; 3]| centres_m.iter().any(|c| distance_m2(at, *c) < reach_m * reach_m);
                 cell.points.iter().any(|point| near(point.0))
             })
-            .partition(|cell| cell.nodes.iter().all(|(node, _)| !refined.fixed[*node as usize]));
-        let fixed_m = fixed.iter().flat_map(|cell| &cell.points).map(|point| point.0).collect();
-        let mut places: BTreeMap<u32, usize> = cells.iter().flat_map(|c| c.nodes).map(|n| (n.0, 0)).collect();
+            .collect();
+        let free = cells.iter().flat_map(|c| c.nodes).filter(|n| !refined.fixed[n.0 as usize]);
+        let mut places: BTreeMap<u32, usize> = free.map(|n| (n.0, 0)).collect();
         let kept: Vec<u32> = places.keys().copied().collect();
         places.values_mut().enumerate().for_each(|(i, place)| *place = i);
         let stiffness = body.condense(&refined, &kept)?;
@@ -120,8 +118,10 @@ impl Zone {
         }
         for (row, cell) in cells.iter().enumerate() {
             for (node, share) in cell.nodes {
+                // A fixed node does not move, so it has no part in the mean displacement.
+                let Some(place) = places.get(&node) else { continue };
                 for k in 0..3 {
-                    matrix[(3 * places[&node] + k) * size + inner + 3 * row + k] = share;
+                    matrix[(3 * place + k) * size + inner + 3 * row + k] = share;
                 }
             }
         }
@@ -134,19 +134,13 @@ impl Zone {
                 compliance[row * loads + column] = value;
             }
         }
-        Ok(Self { cells, fixed_m, compliance })
+        Ok(Self { cells, compliance })
     }
 
     /// Returns the number of cells.
     #[must_use]
     pub fn count(&self) -> usize {
         self.cells.len()
-    }
-
-    /// Returns true if the ball overlaps the undeformed surface where it is fixed: a contact there is not solved.
-    #[must_use]
-    pub fn reaches_fixed(&self, centre_m: [f64; 3], radius_m: f64) -> bool {
-        self.fixed_m.iter().any(|at| distance_m2(*at, centre_m) < radius_m * radius_m)
     }
 
     /// Solves for the contact with the ball centred at `centre_m`, from a contact nearby or from [`Touch::default`]; `None` if
