@@ -1194,6 +1194,20 @@ typedef struct FlotorWorldTable {
                            struct FlotorOutput *outputs);
 } FlotorWorldTable;
 
+// Function table `flotor.world-contacts/1`: see [`WorldContactsModel`].
+typedef struct FlotorWorldContactsTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the contacts at the inputs of `count` ports, after the time since the previous call; `count` is at least 1 and at
+    // most `MAX_PORTS`, else the status is `OutOfRange`. Returns a [`CallStatus`] code. Not real-time, but bounded.
+    uint32_t (*contact_sets)(FlotorInstance instance,
+                             uint32_t count,
+                             const struct FlotorInput *inputs,
+                             struct FlotorContactSet *sets);
+} FlotorWorldContactsTable;
+
 /* Version of the contract, for the metadata. */
 #define FLOTOR_CONTRACT "1.0-rc"
 /* Names of interfaces and extensions. */
@@ -1216,6 +1230,7 @@ typedef struct FlotorWorldTable {
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
 #define FLOTOR_INTERFACE_WORLD "flotor.world/1"
+#define FLOTOR_INTERFACE_WORLD_CONTACTS "flotor.world-contacts/1"
 
 #if defined(_WIN32)
 #define FLOTOR_VISIBLE __declspec(dllexport)
@@ -1569,6 +1584,10 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(WorldTable, size),
     FLOTOR_FIELD(WorldTable, reserved),
     FLOTOR_FIELD(WorldTable, step_ports),
+    FLOTOR_STRUCT(WorldContactsTable),
+    FLOTOR_FIELD(WorldContactsTable, size),
+    FLOTOR_FIELD(WorldContactsTable, reserved),
+    FLOTOR_FIELD(WorldContactsTable, contact_sets),
     FLOTOR_STRUCT(VerticalCalibration),
     FLOTOR_FIELD(VerticalCalibration, range_m),
     FLOTOR_FIELD(VerticalCalibration, coefficients),

@@ -159,6 +159,26 @@ mod tests {
         assert!(difference(&LAYOUTS, &core[1..]).is_some(), "a plugin that does not know `Str`");
     }
 
+    /// Rows of the C header before contact sets and shared objects were part of the contract, as a compiler fills them in:
+    /// `Struct.field`, offset and size.
+    const EARLIER: &str = include_str!("layouts_before_contact_sets.txt");
+
+    #[test]
+    fn a_plugin_built_before_contact_sets_agrees_and_one_before_codes_of_a_cycle_is_refused() {
+        let number = |text: Option<&str>| text.and_then(|text| text.parse().ok()).expect("a number");
+        let row_of = |line: &'static str| {
+            let mut parts = line.split(' ');
+            let name = parts.next().expect("a name");
+            row(name, number(parts.next()), number(parts.next()))
+        };
+        let mut theirs: Vec<FieldLayout> = EARLIER.lines().map(row_of).collect();
+        assert!(theirs.len() > CORE_COUNT && theirs.iter().all(|row| row.struct_name() != "ContactSet"));
+        assert_eq!(difference(&LAYOUTS, &theirs), None);
+        // Still earlier, `read` and `write` of a device returned a plain number.
+        theirs.retain(|row| row.struct_name() != "CycleCode");
+        assert_eq!(difference(&LAYOUTS, &theirs).as_deref(), Some("the plugin lacks `CycleCode`"));
+    }
+
     /// abi_stable sees what the table does not: the same bytes, and a function that takes something else.
     #[cfg(feature = "layout-proof")]
     #[test]
