@@ -1,16 +1,7 @@
 //! Configuration of a virtual coupling between two devices.
 
+use crate::limits::PassivityMode;
 use crate::mapping::MappingConfig;
-
-/// Treatment of energy that a port generates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PassivityMode {
-    /// The energy is only measured.
-    #[default]
-    Observe,
-    /// The energy is measured, and the passivity controller prevents its generation.
-    Control,
-}
 
 /// Virtual spring and damper between two devices, and the delay between them.
 #[derive(Clone, Copy, Debug, PartialEq)]

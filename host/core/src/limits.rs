@@ -1,6 +1,14 @@
 //! Limits of force and motion in a run, and the wall at the end of the device's range.
 
-use crate::coupling::PassivityMode;
+/// Treatment of energy that a port generates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PassivityMode {
+    /// The energy is only measured.
+    #[default]
+    Observe,
+    /// The energy is measured, and the passivity controller prevents its generation.
+    Control,
+}
 
 /// Bound of a vector, in its unit: a largest norm, and a largest component along each axis. Both apply together.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -42,8 +42,9 @@ mod tests;
 pub use claims::{ClaimExcess, Reach};
 pub use end::End;
 pub use flotor_core::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS,
 };
+pub use flotor_core::limits::PassivityMode;
 pub use flotor_core::peer::{Dispatch, PeerState, TankState};
 pub use remote::{Line, LinkStatistics, LinkTimeouts, RemoteEnd};
 pub use tank::Tank;

@@ -3,7 +3,7 @@
 //! Port energy and the controller that ports and couplings share: [`crate::port_energy`].
 
 use crate::port_energy::{Controller, Displacement};
-use flotor_core::coupling::PassivityMode;
+use flotor_core::limits::PassivityMode;
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
 /// Acceleration of a handle from rest that the reserve covers, m/s²: 40 N on 0.58 kg would give 69 m/s², but a hand takes most of

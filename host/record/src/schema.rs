@@ -5,8 +5,8 @@
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
 use crate::{Note, Severity};
-use flotor_core::coupling::PassivityMode;
 use flotor_core::grip::GripRecord;
+use flotor_core::limits::PassivityMode;
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{

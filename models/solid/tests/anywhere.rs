@@ -1,5 +1,6 @@
 //! A ball against curved bodies, grooves and lumps: one place solved directly on a refined mesh, against the open rows.
 
+use crate::leaves_out_long_tests;
 use crate::table::{Row, rows};
 use flotor_solid::condensation::Condensation;
 use flotor_solid::gmsh;
@@ -70,6 +71,9 @@ fn a_dome_and_a_groove_answer_as_the_tables_say() {
         let (force, energy) = errors(&row, &solve(&dome, &row, place(&row)));
         assert!(force < 0.04 && energy.abs() < 0.04, "{force} {energy}");
     }
+    if leaves_out_long_tests() {
+        return;
+    }
     let groove = body("groove", 0.3, 1.0);
     let lips = vec![[0.01, 0.0, 0.0], [-0.01, 0.0, 0.0]];
     for row in some("solid/h_concave.csv", &["h004", "h008", "h012"]) {
@@ -82,6 +86,9 @@ fn a_dome_and_a_groove_answer_as_the_tables_say() {
 /// A tenth of what the lump adds is the bound of the contrast: the errors of the mesh cancel in the ratio.
 #[test]
 fn a_lump_is_felt_as_much_as_it_is_there() {
+    if leaves_out_long_tests() {
+        return;
+    }
     let [with, without] = [10.0, 1.0].map(|factor| body("lump", 0.3, factor));
     for (row, plain) in
         some("solid/f_contrast.csv", &["fc012"]).iter().zip(&some("solid/f_inclusion.csv", &["f024"]))

@@ -20,7 +20,7 @@
 //! - [`files`], [`soup`]: triangles of a file. [`weld`], [`topology`], [`normals`]: an oriented mesh with sharp edges and
 //!   normals.
 //! - [`patch`], [`closest`]: a curved triangle, and its closest point. `tree`, [`surface`]: all of them, and the search.
-//! - `planes`, `proxy`, [`touch`]: the proxy ball, with friction. [`material`]: material parameters by group.
+//! - `contacts`, `planes`, `proxy`, [`touch`]: the proxy ball, with friction. [`material`]: material parameters by group.
 //! - [`object`], [`check`], `store`, `cache`: from a file to a surface that instances share.
 //! - `parameters`, `plugin`, `saved`, `drawing`, `built_in`: the contract.
 #![allow(clippy::needless_range_loop)] // coordinates and corners have numbers, in several arrays at once
@@ -29,6 +29,7 @@ mod built_in;
 mod cache;
 pub mod check;
 pub mod closest;
+mod contacts;
 mod drawing;
 pub mod files;
 pub mod material;

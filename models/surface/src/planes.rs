@@ -1,6 +1,6 @@
 //! Nearest point that satisfies up to four linear inequalities.
 
-use crate::proxy::MOST_CONTACTS;
+use crate::contacts::MOST_CONTACTS;
 use flotor_hal::DVec3;
 
 /// Condition `normal . y >= least_m` on a displacement `y`.
@@ -43,9 +43,9 @@ fn equal(planes: &[Plane], subset: &[usize], to_m: DVec3) -> Option<(DVec3, [f64
     Some((y_m, multipliers))
 }
 
-/// Returns the displacement nearest to `to_m` that satisfies all conditions, and the active conditions; zero if none satisfies them.
+/// Returns the displacement nearest to `to_m` that satisfies all conditions, and the active conditions; `None` if none satisfies them.
 /// Real-time: bounded, no allocation.
-pub(crate) fn project(planes: &[Plane], to_m: DVec3) -> (DVec3, [bool; MOST_CONTACTS]) {
+pub(crate) fn project(planes: &[Plane], to_m: DVec3) -> Option<(DVec3, [bool; MOST_CONTACTS])> {
     let count = planes.len();
     let mut best: Option<(f64, DVec3, usize)> = None;
     for mask in 0..1_usize << count {
@@ -66,6 +66,5 @@ pub(crate) fn project(planes: &[Plane], to_m: DVec3) -> (DVec3, [bool; MOST_CONT
             best = Some((far_m, y_m, mask));
         }
     }
-    let (_, y_m, mask) = best.unwrap_or((0.0, DVec3::ZERO, (1 << count) - 1));
-    (y_m, std::array::from_fn(|i| mask >> i & 1 == 1))
+    best.map(|(_, y_m, mask)| (y_m, std::array::from_fn(|i| mask >> i & 1 == 1)))
 }

@@ -6,13 +6,11 @@
 //! one; with several, in a groove, Newton's method on the tangent planes of up to four contacts finds it. A new position is
 //! accepted only if no other part of the surface lies inside the ball there, or between the old and the new centre.
 
-use crate::closest::Foot;
+use crate::contacts::{Contact, Contacts, MOST_CONTACTS, Side, leads_on};
 use crate::planes::{Plane, project};
 use crate::surface::{Place, Surface};
 use flotor_hal::DVec3;
 
-/// Maximum number of simultaneous contacts: three determine a position, a fourth can replace one of them.
-pub(crate) const MOST_CONTACTS: usize = 4;
 /// Penetration of a patch up to which it is not a new contact, m.
 const TOLERANCE_M: f64 = 2.0e-10;
 /// Length of a Newton step at which several contacts have converged, m.
@@ -27,72 +25,8 @@ const SAFE_SHARE: f64 = 0.9;
 const HIGH_M: f64 = 1.0e-6;
 /// Gap above which a contact ends, m.
 const SKIN_M: f64 = 1.0e-7;
-
-/// Side of a surface on which the ball is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Side {
-    /// Side of the normals.
-    #[default]
-    Front,
-    /// Other side, of an open surface only.
-    Back,
-    /// Not determined: at the border of an open surface.
-    Rim,
-}
-
-impl Side {
-    fn of(height: f64) -> Self {
-        if height < 0.0 { Self::Back } else { Self::Front }
-    }
-
-    fn sign(self) -> f64 {
-        if self == Self::Back { -1.0 } else { 1.0 }
-    }
-}
-
-/// Patch in contact with the ball.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Contact {
-    pub(crate) place: Place,
-    pub(crate) side: Side,
-}
-
-/// Contacts of a ball; the first `count` are in use.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Contacts {
-    pub(crate) all: [Option<Contact>; MOST_CONTACTS],
-}
-
-impl Contacts {
-    pub(crate) fn iter(&self) -> impl Iterator<Item = Contact> + '_ {
-        self.all.iter().copied().flatten()
-    }
-
-    pub(crate) fn count(&self) -> usize {
-        self.all.iter().flatten().count()
-    }
-
-    pub(crate) fn first(&self) -> Option<Contact> {
-        self.iter().next()
-    }
-
-    /// Adds a contact; returns false if the contact exists already or the list is full.
-    fn add(&mut self, contact: Contact) -> bool {
-        let is_known = self.iter().any(|other| is_same(&other.place.foot, &contact.place.foot));
-        match self.all.iter_mut().find(|place| place.is_none()) {
-            Some(place) if !is_known => {
-                *place = Some(contact);
-                true
-            }
-            _ => false,
-        }
-    }
-}
-
-/// Returns true if two closest points coincide and have the same normal.
-fn is_same(a: &Foot, b: &Foot) -> bool {
-    (a.point_m - b.point_m).length() < 1.0e-9 && a.normal.dot(b.normal) > 1.0 - 1.0e-9
-}
+/// Minimum radius of the moving ball, m, also for a point: a point has no side at an edge, and fits between two bodies that touch.
+const LEAST_RADIUS_M: f64 = 1.0e-7;
 
 /// Position of a centre relative to a point of the surface: direction from the surface to the centre, and height above the
 /// surface.
@@ -106,9 +40,18 @@ struct Over {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ball {
     pub(crate) radius_m: f64,
+    /// What the radius exceeds that of the tool by, m.
+    pub(crate) skin_m: f64,
     /// Centre, m.
     pub(crate) centre_m: DVec3,
     pub(crate) contacts: Contacts,
+}
+
+/// Straight path of the tool.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    pub(crate) from_m: DVec3,
+    pub(crate) to_m: DVec3,
 }
 
 /// Obstacle on the path of a ball.
@@ -120,6 +63,43 @@ enum Obstacle {
 }
 
 impl Ball {
+    /// Builds a free ball for a tool of radius `radius_m`.
+    pub(crate) fn new(radius_m: f64, centre_m: DVec3) -> Self {
+        Self { centre_m, ..Self::default() }.with_radius(radius_m)
+    }
+
+    /// Returns this ball for a tool of radius `radius_m`.
+    pub(crate) fn with_radius(self, radius_m: f64) -> Self {
+        let moving_m = radius_m.max(LEAST_RADIUS_M);
+        Self { radius_m: moving_m, skin_m: moving_m - radius_m, ..self }
+    }
+
+    /// Returns the centre of the proxy of the tool, nearest to a tool at `tool_m`: this ball has the same contacts and perhaps a
+    /// larger radius.
+    pub(crate) fn proxy_m(&self, tool_m: DVec3) -> DVec3 {
+        if self.skin_m == 0.0 {
+            return self.centre_m;
+        }
+        let mut planes = [Plane::default(); MOST_CONTACTS];
+        let mut count = 0;
+        for contact in self.contacts.iter() {
+            let normal = (self.centre_m - contact.place.foot.point_m).normalize_or_zero();
+            planes[count] = Plane { normal, least_m: -self.skin_m };
+            count += 1;
+        }
+        match count {
+            0 => self.centre_m,
+            1 => {
+                let proxy_m = self.centre_m - planes[0].normal * self.skin_m;
+                if (proxy_m - tool_m).dot(planes[0].normal) > 0.0 { proxy_m } else { tool_m }
+            }
+            _ => {
+                self.centre_m
+                    + project(&planes[..count], tool_m - self.centre_m).map_or(DVec3::ZERO, |(y_m, _)| y_m)
+            }
+        }
+    }
+
     /// Returns the direction and height of `x_m` above a point of the surface, on one side.
     fn over(&self, surface: &Surface, place: &Place, side: Side, x_m: DVec3) -> Over {
         let foot = &place.foot;
@@ -155,28 +135,44 @@ impl Ball {
             return Side::Rim;
         }
         let height_m = (self.centre_m - place.foot.point_m).dot(place.foot.normal);
-        let is_clear = height_m.abs() > 0.5 * self.radius_m && height_m.abs() > 1.0e-9;
-        if before == Side::Rim || is_clear { Side::of(height_m) } else { before }
+        // On a curved sheet a place that is farther on sees the old centre from behind: only a ball that comes from the rim changes
+        // its side.
+        if before == Side::Rim { Side::of(height_m) } else { before }
     }
 
-    /// Returns the ball nearest to `goal_m` on its contacts; at the goal if it has none.
-    fn target(&self, surface: &Surface, goal_m: DVec3) -> Self {
+    /// Returns the ball nearest to a tool after its path, on its contacts; at the tool if it has none. The second value is false if
+    /// the ball is not at rest there.
+    fn target(&self, surface: &Surface, way: Way) -> (Self, bool) {
         match (self.contacts.count(), self.contacts.first()) {
-            (1, Some(contact)) => self.over_one(surface, goal_m, contact),
-            (0, _) | (_, None) => Self { centre_m: goal_m, ..*self },
-            _ => self.over_several(surface, goal_m),
+            (1, Some(contact)) => (self.over_entered(surface, way, contact), true),
+            (0, _) | (_, None) => (Self { centre_m: way.to_m, ..*self }, true),
+            _ => self.over_several(surface, way.to_m),
         }
     }
 
-    /// Returns the ball nearest to `goal_m` on its only contact; `None` if it has several contacts or loses its contact.
-    pub(crate) fn over_its_contact(&self, surface: &Surface, goal_m: DVec3) -> Option<Self> {
+    /// Returns the ball nearest to a tool after its path, on its only contact; `None` if it has several contacts or loses its contact.
+    pub(crate) fn over_its_contact(&self, surface: &Surface, way: Way) -> Option<Self> {
         let contact = self.contacts.first().filter(|_| self.contacts.count() == 1)?;
-        Some(self.over_one(surface, goal_m, contact)).filter(|ball| ball.contacts.count() == 1)
+        Some(self.over_entered(surface, way, contact)).filter(|ball| ball.contacts.count() == 1)
     }
 
     fn over_one(&self, surface: &Surface, goal_m: DVec3, contact: Contact) -> Self {
+        self.over_place(surface, goal_m, surface.walk(goal_m, contact.place.patch), contact.side)
+    }
+
+    /// Returns the ball over its one contact; at an edge, over the one of two faces through which the tool enters.
+    fn over_entered(&self, surface: &Surface, way: Way, contact: Contact) -> Self {
+        let goal_m = way.to_m;
         let place = surface.walk(goal_m, contact.place.patch);
-        let side = self.side(surface, &place, contact.side);
+        let is_above = |place, at_m| self.over(surface, place, contact.side, at_m).height_m >= 0.0;
+        let enters = is_above(&contact.place, way.from_m) && !is_above(&place, goal_m);
+        let crossing = enters.then(|| surface.first_crossing(way.from_m, goal_m)).flatten();
+        let entry = crossing.map(|crossing| surface.down_from(goal_m, crossing.patch, crossing.at));
+        self.over_place(surface, goal_m, entry.unwrap_or(place), contact.side)
+    }
+
+    fn over_place(&self, surface: &Surface, goal_m: DVec3, place: Place, before: Side) -> Self {
+        let side = self.side(surface, &place, before);
         let over = self.over(surface, &place, side, goal_m);
         if over.height_m >= self.radius_m {
             return Self { centre_m: goal_m, contacts: Contacts::default(), ..*self };
@@ -186,26 +182,35 @@ impl Ball {
         Self { centre_m: place.foot.point_m + over.direction * self.radius_m, contacts, ..*self }
     }
 
-    fn over_several(&self, surface: &Surface, goal_m: DVec3) -> Self {
+    fn over_several(&self, surface: &Surface, goal_m: DVec3) -> (Self, bool) {
         let mut ball = *self;
-        let mut touching = [false; MOST_CONTACTS];
+        let (mut touching, mut is_done) = ([true; MOST_CONTACTS], false);
         for _ in 0..MOST_STEPS {
             let mut planes = [Plane::default(); MOST_CONTACTS];
             let (mut contacts, mut kept) = (Contacts::default(), 0);
-            for contact in ball.contacts.iter() {
-                let place = surface.follow(ball.centre_m, &contact.place, 0.0);
-                let side = self.side(surface, &place, contact.side);
-                let over = ball.over(surface, &place, side, ball.centre_m);
-                if contacts.add(Contact { place, side }) {
-                    planes[kept] = Plane { normal: over.direction, least_m: self.radius_m - over.height_m };
+            let mut places = [None; MOST_CONTACTS];
+            for (place, contact) in places.iter_mut().zip(ball.contacts.iter()) {
+                *place = Some((surface.follow(ball.centre_m, &contact.place, 0.0), contact.side));
+            }
+            for (place, before) in places.iter().flatten() {
+                let side = self.side(surface, place, *before);
+                let over = ball.over(surface, place, side, ball.centre_m);
+                if contacts.add(Contact { place: *place, side }) {
+                    let is_held_by = |(other, _): &(Place, Side)| leads_on(surface, place, other);
+                    // A place without a plane may hold the ball after the next step.
+                    if !places.iter().flatten().any(is_held_by) {
+                        planes[kept] =
+                            Plane { normal: over.direction, least_m: self.radius_m - over.height_m };
+                    }
                     kept += 1;
                 }
             }
             ball.contacts = contacts;
-            let (step_m, active) = project(&planes[..kept], goal_m - ball.centre_m);
+            let Some((step_m, active)) = project(&planes[..kept], goal_m - ball.centre_m) else { break };
             touching = active;
             ball.centre_m += step_m;
-            if step_m.length() <= SETTLED_M {
+            is_done = step_m.length() <= SETTLED_M;
+            if is_done {
                 break;
             }
         }
@@ -216,8 +221,8 @@ impl Ball {
         ball.contacts = left;
         match (ball.contacts.count(), ball.contacts.first()) {
             // For one contact the walk is exact.
-            (1, Some(contact)) => self.over_one(surface, goal_m, contact),
-            _ => ball,
+            (1, Some(contact)) => (self.over_one(surface, goal_m, contact), true),
+            _ => (ball, is_done),
         }
     }
 
@@ -250,9 +255,6 @@ impl Ball {
                 return Some(Obstacle::Between(Contact { place, side }, met_m));
             }
         }
-        if self.radius_m == 0.0 {
-            return None;
-        }
         let in_front = |place: &Place| {
             !surface.is_closed(place)
                 || (next.centre_m - place.foot.point_m).dot(surface.outward(place)) > 0.0
@@ -265,17 +267,18 @@ impl Ball {
         Some(Obstacle::Inside(Contact { place, side }))
     }
 
-    /// Moves the ball towards `goal_m` as far as the surface permits; returns false if the attempts are used up before the ball
-    /// is at rest (its position is free of obstacles in that case, too). Real-time: bounded, no allocation.
-    pub(crate) fn settle(&mut self, surface: &Surface, goal_m: DVec3) -> bool {
+    /// Moves the ball after a tool as far as the surface permits; returns false if the attempts are used up before the ball is at
+    /// rest (its position is free of obstacles in that case, too). Real-time: bounded, no allocation.
+    pub(crate) fn settle(&mut self, surface: &Surface, way: Way) -> bool {
         let (mut share, mut blocked) = (1.0, 0);
         for _ in 0..MOST_ROUNDS {
-            let to_m = self.centre_m + (goal_m - self.centre_m) * share;
-            let next = self.target(surface, if share == 1.0 { goal_m } else { to_m });
+            let to_m = self.centre_m + (way.to_m - self.centre_m) * share;
+            let part = if share == 1.0 { way } else { Way { from_m: to_m, to_m } };
+            let (next, is_at_rest) = self.target(surface, part);
             let contact = match self.obstacle(surface, &next) {
                 None => {
                     *self = next;
-                    if share == 1.0 {
+                    if share == 1.0 && is_at_rest {
                         return true;
                     }
                     (share, blocked) = (1.0, 0);
@@ -285,6 +288,9 @@ impl Ball {
                 Some(Obstacle::Between(contact, met_m)) => {
                     if self.contacts.count() == 0 {
                         self.centre_m = met_m;
+                    }
+                    if next.contacts.count() == 0 && self.move_to_rim(surface, way.to_m) {
+                        continue;
                     }
                     contact
                 }
@@ -302,6 +308,25 @@ impl Ball {
             }
         }
         false
+    }
+
+    /// Moves a ball that leaves its contact over an edge, where the straight way runs through the body: to that edge, or where another
+    /// body is in the way there, along the tangent plane; returns false if it can do neither.
+    fn move_to_rim(&mut self, surface: &Surface, goal_m: DVec3) -> bool {
+        let Some(contact) = self.contacts.first().filter(|_| self.contacts.count() == 1) else {
+            return false;
+        };
+        let normal = self.over(surface, &contact.place, contact.side, self.centre_m).direction;
+        let to_m = goal_m - self.centre_m;
+        let along_m = self.centre_m + to_m - normal * to_m.dot(normal);
+        let rim = self.placed_under(surface, goal_m);
+        let found = [rim, Self { centre_m: along_m, ..*self }].into_iter().find(|next| {
+            (next.centre_m - self.centre_m).length() > SETTLED_M && self.can_move_to(surface, next)
+        });
+        if let Some(next) = found {
+            *self = next;
+        }
+        found.is_some()
     }
 
     /// Removes contacts that the ball does not touch.
@@ -328,7 +353,7 @@ impl Ball {
     /// nearest to `near_m`.
     pub(crate) fn placed_under(&self, surface: &Surface, near_m: DVec3) -> Self {
         let Some(contact) = self.contacts.first().filter(|_| self.contacts.count() == 1) else {
-            return self.target(surface, near_m);
+            return self.over_several(surface, near_m).0;
         };
         let place = surface.follow(near_m, &contact.place, (near_m - self.centre_m).length());
         let direction = self.over(surface, &place, contact.side, near_m).direction;

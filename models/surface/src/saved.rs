@@ -1,8 +1,9 @@
 //! State of the touch for `flotor.snapshot/1`: all numbers that affect the next step, except the surface and the parameters.
 
 use crate::closest::Foot;
+use crate::contacts::{Contact, Contacts, Side};
 use crate::plugin::Touched;
-use crate::proxy::{Ball, Contact, Contacts, Side};
+use crate::proxy::Ball;
 use crate::surface::{Place, Surface};
 use crate::touch::{Friction, State, Touch};
 use flotor_hal::{Restorable, StateBytes, restorable};
@@ -12,7 +13,7 @@ restorable!(Place { patch, foot });
 restorable!(Side = Front | Back | Rim);
 restorable!(Contact { place, side });
 restorable!(Contacts { all });
-restorable!(Ball { centre_m, contacts } without { radius_m });
+restorable!(Ball { centre_m, contacts } without { radius_m, skin_m });
 restorable!(Friction = Free | Sticks | Slides);
 restorable!(Touch { state, friction } without { radius_m });
 
@@ -63,7 +64,7 @@ impl Touch {
             State::Start => true,
             State::Overlapping { tool_m, distance_m } => tool_m.is_finite() && !distance_m.is_nan(),
             State::Outside { ball, tool_m } => {
-                ball.radius_m = radius_m;
+                *ball = ball.with_radius(radius_m);
                 let is_place = |Place { patch, foot }: Place| {
                     let numbers = [foot.at, foot.point_m.to_array(), foot.normal.to_array()];
                     patch < surface.count() && numbers.as_flattened().iter().all(|x| x.is_finite())

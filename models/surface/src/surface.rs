@@ -208,10 +208,11 @@ impl Surface {
     #[must_use]
     pub fn walk(&self, c_m: DVec3, patch: usize) -> Place {
         let (patch, at) = self.flat_walk(c_m, patch);
-        self.descend(c_m, patch, at)
+        self.down_from(c_m, patch, at)
     }
 
-    fn descend(&self, c_m: DVec3, patch: usize, at: Barycentric) -> Place {
+    /// Follows the surface downhill to a local closest point to `c_m`, from a place. Real-time: bounded, no allocation.
+    pub(crate) fn down_from(&self, c_m: DVec3, patch: usize, at: Barycentric) -> Place {
         let mut place = Place { patch, foot: self.patches[patch].closest(c_m, at) };
         for _ in 0..MOST_PATCHES {
             let Some(next) = self.step_on(c_m, &place) else { break };
@@ -225,7 +226,7 @@ impl Surface {
     pub(crate) fn follow(&self, c_m: DVec3, from: &Place, travel_m: f64) -> Place {
         let [p, q, _] = self.patches[from.patch].corners_m;
         if travel_m < NEAR * p.distance(q) {
-            self.descend(c_m, from.patch, from.foot.at)
+            self.down_from(c_m, from.patch, from.foot.at)
         } else {
             self.walk(c_m, from.patch)
         }

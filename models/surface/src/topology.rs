@@ -281,12 +281,21 @@ impl Topology {
     }
 }
 
-/// Returns true if a vertical ray from `from` upwards meets a triangle; a point on a common edge counts for one triangle only.
+/// Returns true if a vertical ray from `from` upwards meets a triangle. A ray through an edge counts for one of the two triangles:
+/// it is moved by infinitesimal distances, more along x than along y (Edelsbrunner and Muecke 1990, ACM Trans. Graphics 9, 66-104).
 fn is_above([p, q, r]: [DVec3; 3], from: DVec3) -> bool {
-    let edge = |a: DVec3, b: DVec3| (b.x - a.x) * (from.y - a.y) - (b.y - a.y) * (from.x - a.x);
+    let side = |a: DVec3, b: DVec3| (b.x - a.x) * (from.y - a.y) - (b.y - a.y) * (from.x - a.x);
+    // Both triangles of an edge compute one number with opposite signs.
+    let edge = |a: DVec3, b: DVec3| if (a.x, a.y) <= (b.x, b.y) { side(a, b) } else { -side(b, a) };
+    let is_left = |a: DVec3, b: DVec3, u: f64| match u == 0.0 {
+        true if a.y == b.y => b.x > a.x,
+        true => b.y < a.y,
+        false => u > 0.0,
+    };
     let (u, v, w) = (edge(q, r), edge(r, p), edge(p, q));
     let area = u + v + w;
-    if area == 0.0 || (u < 0.0) != (v < 0.0) || (v < 0.0) != (w < 0.0) {
+    let sides = [is_left(q, r, u), is_left(r, p, v), is_left(p, q, w)];
+    if area == 0.0 || sides.iter().any(|left| *left != sides[0]) {
         return false;
     }
     (u * p.z + v * q.z + w * r.z) / area > from.z

@@ -6,8 +6,8 @@
 //! slides on at this coefficient until a tick in which it need not move. A slide shortens `|q - c|`, so friction only dissipates.
 
 use crate::material::{Material, Own};
-use crate::proxy::Ball;
-use crate::surface::Surface;
+use crate::proxy::{Ball, Way};
+use crate::surface::{Place, Surface};
 use flotor_hal::DVec3;
 
 /// State of the friction.
@@ -68,6 +68,8 @@ impl Answer {
     };
 }
 
+/// Difference of the distances of two faces at one place, m.
+const TIE_M: f64 = 1.0e-9;
 /// Maximum travel of a point in one step of its path, m: finer steps do not improve a point contact. A larger ball travels at
 /// most 0.9 of its radius.
 const POINT_STEP_M: f64 = 2.0e-3;
@@ -121,9 +123,15 @@ impl Touch {
     /// `bound_m`.
     fn clearance(&self, surface: &Surface, tool_m: DVec3, bound_m: f64) -> (bool, f64) {
         let Some(place) = surface.nearest(tool_m, bound_m, |_| true) else { return (true, bound_m) };
-        let is_outside =
-            !surface.is_closed(&place) || (tool_m - place.foot.point_m).dot(surface.outward(&place)) >= 0.0;
-        (is_outside && place.foot.distance_m >= self.radius_m, place.foot.distance_m)
+        let distance_m = place.foot.distance_m;
+        if distance_m < self.radius_m {
+            return (false, distance_m);
+        }
+        // Faces of two bodies may coincide: outside is what no nearest face has behind it.
+        let is_behind = |place: &Place| {
+            surface.is_closed(place) && (tool_m - place.foot.point_m).dot(surface.outward(place)) < 0.0
+        };
+        (surface.nearest(tool_m, distance_m + TIE_M, is_behind).is_none(), distance_m)
     }
 
     /// Moves the tool to `tool_m` with `velocity_m_per_s` and returns force and contact. Real-time: bounded, no allocation.
@@ -149,7 +157,7 @@ impl Touch {
                     self.state = State::Overlapping { tool_m, distance_m };
                     return Answer { is_overlapping: true, ..Answer::NOTHING };
                 }
-                let ball = Ball { radius_m: self.radius_m, centre_m: tool_m, contacts: Default::default() };
+                let ball = Ball::new(self.radius_m, tool_m);
                 self.state = State::Outside { ball, tool_m };
                 return Answer::NOTHING;
             }
@@ -157,24 +165,25 @@ impl Touch {
         let way_m = tool_m - from_m;
         let part_m = if self.radius_m < LEAST_STEP_M { POINT_STEP_M } else { 0.9 * self.radius_m };
         let parts = (way_m.length() / part_m).ceil().clamp(1.0, MOST_PARTS);
-        let mut is_settled = true;
-        let mut part = 1.0;
+        let (mut is_settled, mut part, mut last_m) = (true, 1.0, from_m);
         while part <= parts {
-            let goal_m = if part == parts { tool_m } else { from_m + way_m * (part / parts) };
-            is_settled &= self.advance(surface, materials, &mut ball, goal_m);
-            part += 1.0;
+            let to_m = if part == parts { tool_m } else { from_m + way_m * (part / parts) };
+            // A ball that is not at rest after one part may be after the next.
+            is_settled = self.advance(surface, materials, &mut ball, Way { from_m: last_m, to_m });
+            (part, last_m) = (part + 1.0, to_m);
         }
         self.state = State::Outside { ball, tool_m };
         let material = materials.of(surface, &ball);
         Answer { is_settled, ..self.answer(surface, &material, &ball, tool_m, velocity_m_per_s) }
     }
 
-    /// Moves the proxy for a tool at `goal_m`; returns true if the proxy is at rest.
-    fn advance(&mut self, surface: &Surface, materials: &Materials, ball: &mut Ball, goal_m: DVec3) -> bool {
+    /// Moves the proxy after the tool; returns true if the proxy is at rest.
+    fn advance(&mut self, surface: &Surface, materials: &Materials, ball: &mut Ball, way: Way) -> bool {
+        let goal_m = way.to_m;
         let material = materials.of(surface, ball);
         let has_friction = material.static_friction > 0.0;
         let Some(normal) = has_friction.then(|| ball.normal(surface)).flatten() else {
-            let settled = ball.settle(surface, goal_m);
+            let settled = ball.settle(surface, way);
             let has_friction = materials.of(surface, ball).static_friction > 0.0 && ball.contacts.count() > 0;
             self.friction = if has_friction { Friction::Sticks } else { Friction::Free };
             return settled;
@@ -183,16 +192,16 @@ impl Touch {
             Friction::Slides => material.sliding(),
             _ => material.static_friction,
         };
-        if excess_m(ball.centre_m - goal_m, normal, coefficient) <= 0.0 {
+        if excess_m(ball.proxy_m(goal_m) - goal_m, normal, coefficient) <= 0.0 {
             self.friction = Friction::Sticks;
             return true;
         }
         let before = *ball;
-        if let Some(edge) = before.slid_on(surface, goal_m, material.sliding()) {
+        if let Some(edge) = before.slid_on(surface, way, material.sliding()) {
             (*ball, self.friction) = (edge, Friction::Slides);
             return true;
         }
-        let settled = ball.settle(surface, goal_m);
+        let settled = ball.settle(surface, way);
         if ball.contacts.count() == 0 {
             self.friction = Friction::Free;
             return settled;
@@ -215,8 +224,11 @@ impl Touch {
         tool_m: DVec3,
         velocity_m_per_s: DVec3,
     ) -> Answer {
-        let stretch_m = ball.centre_m - tool_m;
         let Some(contact) = ball.contacts.first() else { return Answer::NOTHING };
+        let stretch_m = ball.proxy_m(tool_m) - tool_m;
+        if stretch_m == DVec3::ZERO {
+            return Answer::NOTHING;
+        }
         // Without friction the spring force is along the normal of all contacts.
         let is_along = material.static_friction == 0.0 || ball.contacts.count() > 1;
         let along = is_along.then(|| stretch_m.try_normalize()).flatten();
@@ -244,7 +256,7 @@ impl Touch {
     #[must_use]
     pub fn proxy_m(&self) -> Option<DVec3> {
         match self.state {
-            State::Outside { ball, .. } if ball.contacts.count() > 0 => Some(ball.centre_m),
+            State::Outside { ball, tool_m } if ball.contacts.count() > 0 => Some(ball.proxy_m(tool_m)),
             _ => None,
         }
     }
@@ -261,11 +273,11 @@ fn excess_m(stretch_m: DVec3, normal: DVec3, coefficient: f64) -> f64 {
 }
 
 impl Ball {
-    /// Returns this ball after sliding on its only contact towards a tool at `goal_m` as far as friction permits; `None` for
-    /// another contact, the end of this contact, or an obstacle.
-    fn slid_on(&self, surface: &Surface, goal_m: DVec3, coefficient: f64) -> Option<Self> {
-        let free = self.over_its_contact(surface, goal_m)?;
-        let edge = at_cone(surface, self, &free, goal_m, coefficient)?;
+    /// Returns this ball after sliding on its only contact after a tool as far as friction permits; `None` for another contact, the
+    /// end of this contact, or an obstacle.
+    fn slid_on(&self, surface: &Surface, way: Way, coefficient: f64) -> Option<Self> {
+        let free = self.over_its_contact(surface, way)?;
+        let edge = at_cone(surface, self, &free, way.to_m, coefficient)?;
         self.can_move_to(surface, &edge).then_some(edge)
     }
 }
@@ -273,7 +285,8 @@ impl Ball {
 /// Returns the ball between its frictionless position `free` and its position `before` with the force on the friction cone;
 /// `None` if the force at the frictionless position is outside the cone.
 fn at_cone(surface: &Surface, before: &Ball, free: &Ball, goal_m: DVec3, coefficient: f64) -> Option<Ball> {
-    let excess = |ball: &Ball| Some(excess_m(ball.centre_m - goal_m, ball.normal(surface)?, coefficient));
+    let excess =
+        |ball: &Ball| Some(excess_m(ball.proxy_m(goal_m) - goal_m, ball.normal(surface)?, coefficient));
     let (mut low, mut high) = (0.0, 1.0);
     let mut low_m = excess(free)?;
     if coefficient == 0.0 || low_m > 0.0 {

@@ -147,7 +147,7 @@ fn nodes_of_a_scene_place_their_meshes() {
     let object = read("m.glb", glb(&cuboid(DVec3::ZERO, DVec3::ONE, 1), node), &READING).expect("a mesh");
     assert_eq!(object.surface.box_m(), [DVec3::new(1.0, 0.0, -2.0), DVec3::new(2.0, 1.0, 0.0)]);
     assert_eq!(object.names, ["wood"]);
-    assert!(object.remarks.iter().all(|remark| !remark.contains("turned")), "{:?}", object.remarks);
+    assert!(object.remarks.iter().all(|remark| !remark.contains("reversed")), "{:?}", object.remarks);
 }
 
 /// Outcome of a defect.
@@ -173,7 +173,7 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
         change(&mut soup);
         rows.push((what, soup, told));
     };
-    with("a face twice", ball(), &|s| s.triangles.push(s.triangles[5]), Told::Healed("twice"));
+    with("a face twice", ball(), &|s| s.triangles.push(s.triangles[5]), Told::Healed("duplicate"));
     with(
         "a face twice, turned in its corners",
         ball(),
@@ -181,7 +181,7 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
             let [a, b, c] = s.triangles[5];
             s.triangles.push([b, c, a]);
         },
-        Told::Healed("twice"),
+        Told::Healed("duplicate"),
     );
     with(
         "two corners of one point",
@@ -196,18 +196,18 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
         Told::Healed("corners coincide"),
     );
     with("a hole", ball(), &|s| s.triangles.truncate(s.triangles.len() - 1), Told::Healed("open"));
-    with("a face the wrong way round", ball(), &|s| s.triangles[9].swap(0, 1), Told::Healed("turned"));
+    with("a face the wrong way round", ball(), &|s| s.triangles[9].swap(0, 1), Told::Healed("reversed"));
     with(
         "all faces the wrong way round",
         ball(),
         &|s| s.triangles.iter_mut().for_each(|t| t.swap(0, 1)),
-        Told::Healed("turned"),
+        Told::Healed("reversed"),
     );
     with(
         "half of the faces the wrong way round",
         cube(),
         &|s| s.triangles.iter_mut().step_by(2).for_each(|t| t.swap(0, 1)),
-        Told::Healed("turned"),
+        Told::Healed("reversed"),
     );
     with(
         "loose faces",
@@ -234,7 +234,7 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
             s.triangles = (0..s.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
             s.points = loose;
         },
-        Told::Healed("joined"),
+        Told::Healed("merged over gaps"),
     );
     with("points of no face", ball(), &|s| s.points.push([9.0, 9.0, 9.0]), Told::Felt);
     with(
@@ -281,11 +281,11 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
         (cuboid(DVec3::splat(0.005), DVec3::new(0.012, 0.011, 0.03), 1), crossed.points.len() as u32);
     crossed.points.extend(other.points);
     crossed.triangles.extend(other.triangles.iter().map(|t| t.map(|c| c + first)));
-    rows.push(("two bodies through each other", crossed, Told::Healed("through each other, the first at")));
+    rows.push(("two bodies through each other", crossed, Told::Healed("intersect, the first at")));
     rows.push((
         "too large",
         soup_of(&[[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], &[[0, 1, 2]]),
-        Told::Refused("at most 4"),
+        Told::Refused("the limit of 4 m"),
     ));
     rows
 }
@@ -413,4 +413,22 @@ fn a_unit_is_guessed_and_told() {
     assert!((in_m - in_mm).abs() < 1.0e-6 && remarks[0].contains("assumed to be m;"), "{in_m} {in_mm}");
     let inch = Reading { unit: Unit::Inch, ..READING };
     assert!((size_mm(ball(1.0), &inch).0 - 0.0254 * in_m).abs() < 1.0e-6);
+}
+
+#[test]
+fn a_cavity_below_an_edge_of_the_outer_faces_stays_a_cavity() {
+    // The first corner of the cavity lies below diagonals and below an edge between two squares.
+    for (low, high) in [
+        (DVec3::splat(-0.005), DVec3::splat(0.005)),
+        (DVec3::new(0.0, 0.0, -0.005), DVec3::splat(0.005)),
+        (DVec3::new(0.0, -0.003, -0.005), DVec3::splat(0.005)),
+    ] {
+        let mut soup = cuboid(DVec3::splat(-0.01), DVec3::splat(0.01), 2);
+        let first = soup.points.len() as u32;
+        let cavity = cuboid(low, high, 1);
+        soup.points.extend(cavity.points);
+        soup.triangles.extend(cavity.triangles.iter().map(|[a, b, c]| [a + first, c + first, b + first]));
+        let object = read("m.obj", obj(&soup), &READING).expect("a mesh");
+        assert!(object.remarks.iter().all(|remark| !remark.contains("reversed")), "{:?}", object.remarks);
+    }
 }

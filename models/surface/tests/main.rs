@@ -3,6 +3,10 @@
 #![allow(clippy::unwrap_used)] // text into memory
 
 mod contact;
+mod edges;
+mod exhaustive;
 mod files;
+mod search;
 mod shapes;
 mod smooth;
+mod walls;

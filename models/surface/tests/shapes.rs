@@ -181,6 +181,29 @@ pub(crate) fn cuboid(low: DVec3, high: DVec3, n: u32) -> Soup {
     soup(&points, triangles)
 }
 
+/// Sheet over a square of 20 mm, `n` cells to a side.
+pub(crate) fn sheet(n: u32, height_m: impl Fn(f64, f64) -> f64) -> Soup {
+    let x = |i: u32| 0.02 * (f64::from(i) / f64::from(n) - 0.5);
+    let points: Vec<DVec3> = (0..=n)
+        .flat_map(|i| (0..=n).map(move |j| (i, j)))
+        .map(|(i, j)| DVec3::new(x(i), x(j), height_m(x(i), x(j))))
+        .collect();
+    let at = |i: u32, j: u32| i * (n + 1) + j;
+    let cells = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let triangles = cells.flat_map(|(i, j)| {
+        [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+    });
+    soup(&points, triangles.collect())
+}
+
+/// Both soups in one.
+pub(crate) fn soup_of_both(mut a: Soup, b: Soup) -> Soup {
+    let first = a.points.len() as u32;
+    a.points.extend(b.points);
+    a.triangles.extend(b.triangles.iter().map(|t| t.map(|c| c + first)));
+    a
+}
+
 /// Small generator of numbers from 0 to 1 (Marsaglia 2003, xorshift).
 pub(crate) struct Numbers(pub(crate) u64);
 

@@ -419,7 +419,7 @@ mod tests {
         for (from, to, line, word) in [
             ("radius_mm = 5", "radius_mm = 0", 1, "radius_mm"),
             ("radius_mm = 5", "radius_mm = nan", 1, "radius_mm"),
-            ("shape = \"ball\"", "shape = \"plane\"", 1, "no plane"),
+            ("shape = \"ball\"", "shape = \"plane\"", 1, "a plane"),
             ("mass_g = 100", "", 4, "mass_g"),
             ("mass_g = 100", "mass_g = 100\nfixed = true", 4, "fixed"),
             ("mass_g = 100", "mass = 100", 8, "unknown field `mass`"),

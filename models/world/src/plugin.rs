@@ -5,9 +5,9 @@ use crate::simulation::{SHORTEST_STEP_S, Simulation, stable_step_s, stiffest};
 use crate::touch::Law;
 use crate::{drawing, own};
 use flotor_hal::{
-    ContactSet, ContactSetModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output, Parameter,
-    Refusal, SetParameterError, Settings, Shape, ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench,
-    read_text,
+    ContactSet, ContactSetModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output, Parameter, Pose,
+    Refusal, SetParameterError, Settings, Shape, ShapeModel, SoftRange, SoftRangeModel, StepStatus,
+    WorldContactsModel, Wrench, read_text,
 };
 use std::path::Path;
 
@@ -82,7 +82,7 @@ impl ForceModel for Touched {
             )));
         }
         Ok(Self {
-            simulation: Some(Simulation::new(&world)),
+            simulation: Some(Simulation::new(&world, 1)),
             world,
             parameters,
             law,
@@ -132,9 +132,27 @@ fn law(world: &World, parameters: &[f64; SCHEMA.len()]) -> (Law, f64) {
 impl ContactSetModel for Touched {
     /// Moves the world to the time of the input, and returns the planes near the tool.
     fn contact_set(&mut self, input: &Input) -> ContactSet {
-        let simulation = self.simulation.get_or_insert_with(|| Simulation::new(&self.world));
-        simulation.advance(&input.pose, input.dt_s(), &self.law, self.step_s);
-        simulation.contacts(input, &self.law)
+        let mut sets = [ContactSet::NONE];
+        self.contact_sets(std::slice::from_ref(input), &mut sets);
+        let [set] = sets;
+        set
+    }
+}
+
+impl WorldContactsModel for Touched {
+    /// Moves the world to the time of the inputs with a tool in each hand, and returns the planes near each.
+    fn contact_sets(&mut self, inputs: &[Input], sets: &mut [ContactSet]) {
+        let Some(first) = inputs.first() else { return };
+        let fits = |simulation: &Simulation| simulation.hands() == inputs.len();
+        if !self.simulation.as_ref().is_some_and(fits) {
+            self.simulation = None;
+        }
+        let simulation = self.simulation.get_or_insert_with(|| Simulation::new(&self.world, inputs.len()));
+        let poses: Vec<Pose> = inputs.iter().map(|input| input.pose).collect();
+        simulation.advance(&poses, first.dt_s(), &self.law, self.step_s);
+        for (hand, (input, set)) in inputs.iter().zip(sets).enumerate() {
+            *set = simulation.contacts(hand, input, &self.law);
+        }
     }
 }
 
@@ -142,15 +160,15 @@ impl ShapeModel for Touched {
     /// Draws bodies and tool. The world of the pictures moves between them as under the handle of the pictures.
     fn shape(&mut self, input: &Input) -> &Shape {
         let (simulation, last_ns) =
-            self.drawn.get_or_insert_with(|| (Simulation::new(&self.world), input.time_ns));
+            self.drawn.get_or_insert_with(|| (Simulation::new(&self.world, 1), input.time_ns));
         if input.time_ns < *last_ns {
             // An earlier moment of a recording: from the start.
-            (*simulation, *last_ns) = (Simulation::new(&self.world), input.time_ns);
+            (*simulation, *last_ns) = (Simulation::new(&self.world, 1), input.time_ns);
         }
         #[allow(clippy::cast_precision_loss)] // less than a century
         let time_s = (input.time_ns - *last_ns) as f64 * 1.0e-9;
         *last_ns = input.time_ns;
-        simulation.advance(&input.pose, time_s, &self.law, self.step_s);
+        simulation.advance(&[input.pose], time_s, &self.law, self.step_s);
         drawing::draw(&self.world, simulation, &input.pose, &mut self.shape);
         &self.shape
     }
@@ -164,4 +182,4 @@ impl SoftRangeModel for Touched {
     ];
 }
 
-flotor_hal::export_model!(Touched, contact_set, shape, soft_range);
+flotor_hal::export_model!(Touched, contact_set, shape, soft_range, world_contacts);

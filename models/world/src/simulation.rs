@@ -1,4 +1,4 @@
-//! Simulation of a world with its tool.
+//! Simulation of a world with the tool of each hand.
 
 use crate::bodies::{Bodies, Energy};
 use crate::file::World;
@@ -12,25 +12,58 @@ const STEP_SHARE: f64 = 0.35;
 /// Minimum step, s.
 pub const SHORTEST_STEP_S: f64 = 5.0e-5;
 
-/// World with the tool in it.
+/// World with the tool of each hand in it.
 pub struct Simulation {
     bodies: Bodies,
+    hands: Vec<Hand>,
+}
+
+/// Hand with its tool.
+struct Hand {
     touch: Touch,
-    /// Handle after the last call; `None` before the first.
+    /// Handle after the last call; `None` before the first with a pose.
     handle: Option<Pose>,
     on_hand_n: DVec3,
 }
 
-impl Simulation {
-    /// Creates a world at its start. Not real-time.
-    #[must_use]
-    pub fn new(world: &World) -> Self {
-        Self {
-            bodies: Bodies::new(world),
-            touch: Touch::new(&world.tool),
-            handle: None,
-            on_hand_n: DVec3::ZERO,
+/// Motion of a handle in a call.
+#[derive(Clone, Copy)]
+struct Motion {
+    from: Pose,
+    to: Pose,
+    way_m: DVec3,
+    turn_rad: DVec3,
+}
+
+impl Motion {
+    fn new(from: Pose, to: Pose) -> Self {
+        let way_m = to.position() - from.position();
+        let turn_rad = rotation_vector(to.orientation() * from.orientation().conjugate());
+        Self { from, to, way_m, turn_rad }
+    }
+
+    /// Returns the pose after a share of the time, 0 to 1.
+    fn at(&self, share: f64) -> Pose {
+        if share >= 1.0 {
+            return self.to;
         }
+        let orientation = self.from.orientation().lerp(self.to.orientation(), share).normalize();
+        Pose::new(self.from.position() + self.way_m * share, orientation)
+    }
+}
+
+impl Simulation {
+    /// Creates a world at its start, with the same tool in each of `hands` hands. Not real-time.
+    #[must_use]
+    pub fn new(world: &World, hands: usize) -> Self {
+        let hand = || Hand { touch: Touch::new(&world.tool), handle: None, on_hand_n: DVec3::ZERO };
+        Self { bodies: Bodies::new(world), hands: (0..hands).map(|_| hand()).collect() }
+    }
+
+    /// Returns the number of hands.
+    #[must_use]
+    pub fn hands(&self) -> usize {
+        self.hands.len()
     }
 
     /// Returns the bodies.
@@ -39,10 +72,10 @@ impl Simulation {
         &self.bodies
     }
 
-    /// Returns the force on the hand in the last step, N.
+    /// Returns the force on a hand in the last step, N; zero for a hand that is not there.
     #[must_use]
-    pub fn on_hand_n(&self) -> DVec3 {
-        self.on_hand_n
+    pub fn on_hand_n(&self, hand: usize) -> DVec3 {
+        self.hands.get(hand).map_or(DVec3::ZERO, |hand| hand.on_hand_n)
     }
 
     /// Returns the energies of all bodies.
@@ -51,37 +84,37 @@ impl Simulation {
         self.bodies.energy()
     }
 
-    /// Moves the handle to `pose` in `time_s`, and the bodies with it, in steps of at most `step_s`. A pose that is not finite leaves
-    /// the handle where it is. Not real-time.
-    pub fn advance(&mut self, pose: &Pose, time_s: f64, law: &Law, step_s: f64) {
-        let from = self.handle.unwrap_or(*pose);
-        let to = if is_usable(pose) { *pose } else { from };
-        if !is_usable(&to) {
+    /// Moves each handle to its pose in `time_s`, and the bodies with them, in steps of at most `step_s`. A pose that is not finite
+    /// leaves its handle where it is. Without any pose yet the world stands still. Not real-time.
+    pub fn advance(&mut self, poses: &[Pose], time_s: f64, law: &Law, step_s: f64) {
+        let mut motions = Vec::with_capacity(self.hands.len());
+        for (hand, pose) in self.hands.iter_mut().zip(poses) {
+            let to = if is_usable(pose) { Some(*pose) } else { hand.handle };
+            motions.push(to.map(|to| Motion::new(hand.handle.unwrap_or(to), to)));
+            hand.handle = to;
+        }
+        if motions.iter().all(Option::is_none) {
             return;
         }
-        self.handle = Some(to);
         let time_s = time_s.clamp(0.0, LONGEST_S);
         let steps = (time_s / step_s).ceil();
-        let way_m = to.position() - from.position();
-        let turn_rad = rotation_vector(to.orientation() * from.orientation().conjugate());
         let mut step = 0.0;
         while step < steps {
             step += 1.0;
-            let share = step / steps;
-            let orientation = from.orientation().lerp(to.orientation(), share).normalize();
-            let now = if step < steps { Pose::new(from.position() + way_m * share, orientation) } else { to };
-            self.on_hand_n =
-                self.touch.push(&mut self.bodies, &now, [way_m / time_s, turn_rad / time_s], law);
+            for (hand, motion) in self.hands.iter_mut().zip(&motions) {
+                let Some(motion) = motion else { continue };
+                let twist = [motion.way_m / time_s, motion.turn_rad / time_s];
+                hand.on_hand_n = hand.touch.push(&mut self.bodies, &motion.at(step / steps), twist, law);
+            }
             self.bodies.step(time_s / steps);
         }
     }
 
-    /// Returns the contacts of the tool at an input; none for a pose that is not finite. Not real-time.
-    pub fn contacts(&mut self, input: &Input, law: &Law) -> ContactSet {
-        if is_usable(&input.pose) {
-            self.touch.contacts(&self.bodies, input, law)
-        } else {
-            ContactSet { time_ns: input.time_ns, ..ContactSet::NONE }
+    /// Returns the contacts of the tool of a hand at an input; none for a pose that is not finite. Not real-time.
+    pub fn contacts(&mut self, hand: usize, input: &Input, law: &Law) -> ContactSet {
+        match self.hands.get_mut(hand) {
+            Some(hand) if is_usable(&input.pose) => hand.touch.contacts(&self.bodies, input, law),
+            _ => ContactSet { time_ns: input.time_ns, ..ContactSet::NONE },
         }
     }
 }

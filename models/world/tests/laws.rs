@@ -23,8 +23,8 @@ fn run(simulation: &mut Simulation, seconds: f64, path: impl Fn(f64) -> DVec3) -
     (0_u32..)
         .take_while(|step| time(*step) < seconds + 0.5 * STEP_S)
         .map(|step| {
-            simulation.advance(&at(path(time(step))), if step == 0 { 0.0 } else { STEP_S }, &LAW, STEP_S);
-            simulation.on_hand_n()
+            simulation.advance(&[at(path(time(step)))], if step == 0 { 0.0 } else { STEP_S }, &LAW, STEP_S);
+            simulation.on_hand_n(0)
         })
         .collect()
 }
@@ -39,7 +39,7 @@ const TRAY: &str = "[tool]\nshape = \"box\"\nsize_mm = [50, 50, 4]\nposition_mm 
 
 #[test]
 fn a_box_on_a_tray_weighs_its_weight_after_half_a_second() {
-    let mut simulation = Simulation::new(&world(TRAY));
+    let mut simulation = Simulation::new(&world(TRAY), 1);
     let forces_n = run(&mut simulation, 2.0, |_| DVec3::ZERO);
     let weight_n = 0.1 * GRAVITY_M_PER_S2;
     for force_n in &forces_n[500..] {
@@ -51,7 +51,7 @@ fn a_box_on_a_tray_weighs_its_weight_after_half_a_second() {
 
 #[test]
 fn a_tray_that_accelerates_feels_mass_times_acceleration() {
-    let mut simulation = Simulation::new(&world(TRAY));
+    let mut simulation = Simulation::new(&world(TRAY), 1);
     let _ = run(&mut simulation, 1.0, |_| DVec3::ZERO);
     // From rest with 2 m/s² for 0.3 s: the spring settles in the first third.
     let forces_n = run(&mut simulation, 0.3, |time_s| DVec3::Z * (time_s * time_s));
@@ -63,7 +63,7 @@ fn a_tray_that_accelerates_feels_mass_times_acceleration() {
 #[test]
 fn a_box_slips_on_the_tray_where_coulomb_says() {
     // The tray tilts slowly about y: the box slips at tan(angle) = mu.
-    let mut simulation = Simulation::new(&world(TRAY));
+    let mut simulation = Simulation::new(&world(TRAY), 1);
     let _ = run(&mut simulation, 0.5, |_| DVec3::ZERO);
     let tilted = |angle_rad: f64| Pose::new(DVec3::ZERO, DQuat::from_axis_angle(DVec3::Y, angle_rad));
     let along_m = |simulation: &Simulation, angle_rad: f64| {
@@ -75,7 +75,7 @@ fn a_box_slips_on_the_tray_where_coulomb_says() {
     while along_m(&simulation, angle_rad) - start_m < 2.5e-3 {
         angle_rad += 0.05 * STEP_S;
         assert!(angle_rad < 1.0, "it never slips");
-        simulation.advance(&tilted(angle_rad), STEP_S, &LAW, STEP_S);
+        simulation.advance(&[tilted(angle_rad)], STEP_S, &LAW, STEP_S);
     }
     // Up to the slip the box moves by its weight over the stiffness of the friction, less than 1 mm.
     assert!((angle_rad.tan() / 0.5 - 1.0).abs() < 0.02, "tan is {}", angle_rad.tan());
@@ -88,7 +88,7 @@ const SLIDE: &str = "gravity_m_per_s2 = 0\n[tool]\nshape = \"ball\"\nradius_mm =
 
 #[test]
 fn a_joint_rubs_with_its_friction_and_ends_at_its_stop() {
-    let mut simulation = Simulation::new(&world(SLIDE));
+    let mut simulation = Simulation::new(&world(SLIDE), 1);
     // Up to the box at y = 1 mm, and on at 10 mm/s.
     let forces_n = run(&mut simulation, 0.5, |time_s| DVec3::Y * (0.01 * time_s));
     let felt_n = -mean(&forces_n[350..450]).y;
@@ -104,7 +104,7 @@ fn a_joint_rubs_with_its_friction_and_ends_at_its_stop() {
 
 #[test]
 fn a_joint_holds_below_its_friction() {
-    let mut simulation = Simulation::new(&world(SLIDE));
+    let mut simulation = Simulation::new(&world(SLIDE), 1);
     // 1.5 mm deep: 0.75 N.
     let forces_n = run(&mut simulation, 5.0, |time_s| DVec3::Y * 0.0025 * time_s.min(1.0));
     let slid_m = simulation.bodies().pose(0).expect("there is a slider").position().y - 0.015;
@@ -115,7 +115,7 @@ fn a_joint_holds_below_its_friction() {
 #[test]
 fn a_falling_body_keeps_its_energy() {
     let text = TRAY.replace("position_mm = [0, 0, 15.1]", "position_mm = [200, 0, 15.1]");
-    let mut simulation = Simulation::new(&world(&text));
+    let mut simulation = Simulation::new(&world(&text), 1);
     let start = simulation.energy();
     let _ = run(&mut simulation, 0.5, |_| DVec3::ZERO);
     let end = simulation.energy();
@@ -178,4 +178,30 @@ fn gaps_agree_with_their_points_and_the_tool_is_near() {
             assert!((normal.length() - 1.0).abs() < 1.0e-12);
         }
     }
+}
+
+const BEAM: &str = "[tool]\nshape = \"box\"\nsize_mm = [20, 20, 4]\nposition_mm = [0, 0, -2]\nfriction = 0.5\n\
+                    [[body]]\nname = \"beam\"\nshape = \"box\"\nsize_mm = [80, 20, 10]\nmass_g = 100\n\
+                    position_mm = [0, 0, 5.1]\nfriction = 0.5\n";
+
+#[test]
+fn two_hands_carry_a_weight_together_and_one_feels_the_other_leave() {
+    let mut simulation = Simulation::new(&world(BEAM), 2);
+    let places = |left_m: f64| [at(DVec3::new(-0.03, 0.0, left_m)), at(DVec3::new(0.03, 0.0, 0.0))];
+    let weight_n = 0.1 * GRAVITY_M_PER_S2;
+    for step in 0..2_000 {
+        simulation.advance(&places(0.0), if step == 0 { 0.0 } else { STEP_S }, &LAW, STEP_S);
+        let [left_n, right_n] = [0, 1].map(|hand| -simulation.on_hand_n(hand).z);
+        if step >= 500 {
+            assert!(((left_n + right_n) / weight_n - 1.0).abs() < 0.01, "{left_n} N and {right_n} N");
+            assert!((left_n / right_n - 1.0).abs() < 0.01, "{left_n} N and {right_n} N");
+        }
+    }
+    let before_n = simulation.on_hand_n(1).z;
+    // The left hand goes down with 1 m/s: the other has a part of the weight within 20 ms.
+    for step in 1..=20 {
+        simulation.advance(&places(-1.0e-3 * f64::from(step)), STEP_S, &LAW, STEP_S);
+    }
+    let change = (simulation.on_hand_n(1).z / before_n - 1.0).abs();
+    assert!(change > 0.05, "the right hand feels {change} of its force");
 }

@@ -3,8 +3,9 @@
 #[path = "../../src/plugin_description.rs"]
 mod plugin_description;
 
-use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
+use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds};
 use flotor_core::grip::GripRecord;
+use flotor_core::limits::PassivityMode;
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};

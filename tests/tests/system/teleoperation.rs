@@ -1,7 +1,7 @@
 //! Several devices in one loop: alone they are as if alone, coupled they are stable in every hand, and no energy comes
 //! out that no hand put in.
 
-use flotor_core::coupling::PassivityMode;
+use flotor_core::limits::PassivityMode;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Fault};
 use flotor_record::Recording;

@@ -279,8 +279,12 @@ impl Registry {
         let unknown_program = || installation_is_unknown().map(str::to_owned);
         let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
         // Outside the default build, for what they alone need: readers of meshes, the solver of bodies, Python.
-        let optional =
-            [("surface", "flotor-surface"), ("world", "flotor-world"), ("python", "flotor-python-model")];
+        let optional = [
+            ("surface", "flotor-surface"),
+            ("world", "flotor-world"),
+            ("simulator", "flotor-simulator"),
+            ("python", "flotor-python-model"),
+        ];
         let package = optional.into_iter().find(|(plugin, _)| *plugin == id).map(|(_, package)| package);
         let by_name =
             || package.map(|name| format!("build it in Flotor's sources: `cargo build --release -p {name}`"));

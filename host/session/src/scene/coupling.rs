@@ -4,8 +4,9 @@ use super::devices::{self, DeviceUse};
 use super::reader::{SceneError, Section, Value};
 use super::{Limits, frame_and_scales, passivity};
 use flotor_core::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS,
 };
+use flotor_core::limits::PassivityMode;
 use flotor_core::mapping::MappingConfig;
 
 /// Reads all couplings, in the order of the file.
