@@ -86,10 +86,9 @@ fn is_stable(plant: Plant, way: Way, stiffness_n_per_m: f64) -> bool {
 /// Returns the largest stiffness up to which every tried wall is stable, N/m, to 2 %.
 fn limit_n_per_m(plant: Plant, way: Way) -> f64 {
     let mut stiffness_n_per_m = 20.0;
-    for factor in [1.2, 1.02] {
-        while stiffness_n_per_m < 1.0e5 && is_stable(plant, way, factor * stiffness_n_per_m) {
-            stiffness_n_per_m *= factor;
-        }
+    // In small steps, because a stiffer wall may be stable again beyond one that is not.
+    while stiffness_n_per_m < 1.0e5 && is_stable(plant, way, 1.02 * stiffness_n_per_m) {
+        stiffness_n_per_m *= 1.02;
     }
     stiffness_n_per_m
 }
