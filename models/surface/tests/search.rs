@@ -1,6 +1,6 @@
 //! The proxy against an exhaustive search over all patches, for poses reached from outside.
 //!
-//! The proxy must be at the free place nearest to the tool. Where it is not, the nearest place must be out of reach: the reference
+//! The proxy must be at the free place nearest to the tool. Where it is not, the nearest place must be unreachable: the reference
 //! then follows the path of the tool.
 
 use crate::contact::{Hand, material};
