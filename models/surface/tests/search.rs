@@ -134,7 +134,7 @@ fn compare(name: &str, surface: &Surface, deepest_m: f64, poses: usize, seed: u6
         }
     }
     println!(
-        "{name}: {} poses, {} in contact, {} with several contacts, {} where the nearest place is out of reach; depth differs by {:e} m, \
+        "{name}: {} poses, {} in contact, {} with several contacts, {} where the nearest place is not reachable; depth differs by {:e} m, \
          the point by {:e} m in {} poses; {} wrong",
         count.poses,
         count.contacts,
