@@ -227,7 +227,7 @@ deny() {
 wheel() {
     cargo clippy --manifest-path interop/python/Cargo.toml --target-dir target --all-targets -- -D warnings
     python3 -m venv target/venv
-    CARGO_TARGET_DIR=$PWD/target target/venv/bin/pip install --quiet 'interop/python[test]' mcap-protobuf-support
+    CARGO_TARGET_DIR=$PWD/target target/venv/bin/pip install --quiet 'interop/python[test]' mcap-protobuf-support mujoco
     cargo build --release
     cargo build --release --manifest-path interop/sweep/Cargo.toml --target-dir target/sweep
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q interop/python
@@ -243,7 +243,7 @@ wheel() {
 lerobot() {
     python3.12 -m venv target/lerobot
     CARGO_TARGET_DIR=$PWD/target target/lerobot/bin/pip install --quiet interop/python interop/lerobot pytest
-    FLOTOR_TELEOPERATION_S=600 target/lerobot/bin/python -m pytest -q interop/lerobot
+    PATH=$PWD/target/lerobot/bin:$PATH book_blocks lerobot
 }
 
 # book_blocks STEP [COMMAND...]: runs the blocks of the book that are marked with this step, in the chapters that have them; with a

@@ -137,7 +137,7 @@ impl Condensation {
     /// # Errors
     /// [`NotPositive`] if the parameters do not describe an elastic solid.
     pub fn new(base: Refinement, materials: Vec<Lame>, regions: Vec<usize>) -> Result<Self, NotPositive> {
-        let nodes: Vec<[u32; 10]> = base.leaves().map(|(_, nodes)| nodes).collect();
+        let nodes: Vec<[u32; 10]> = base.elements().map(|(_, nodes)| nodes).collect();
         let count = nodes.len();
         let mut body = Self { base, materials, regions, parts: Vec::new(), leaves: vec![0; count], root: 0 };
         let around = counts(&body.base);
@@ -182,7 +182,7 @@ impl Condensation {
         let mut changed = vec![false; self.parts.len()];
         let at = |node: &u32| refined.nodes_m[*node as usize];
         let samples: Vec<[f64; 3]> = kept.iter().step_by(1 + kept.len() / SAMPLES).map(at).collect();
-        for (leaf, nodes) in refined.leaves() {
+        for (leaf, nodes) in refined.elements() {
             let is_new = leaf.corners != self.base.tetrahedra[leaf.parent as usize].corners;
             if is_new || nodes.iter().any(|n| kept.binary_search(n).is_ok()) {
                 let middle_m = middle(refined, &nodes);
@@ -209,7 +209,7 @@ impl Condensation {
 /// Returns the number of elements at each node.
 fn counts(refinement: &Refinement) -> Vec<u32> {
     let mut around = vec![0; refinement.nodes_m.len()];
-    refinement.leaves().flat_map(|(_, nodes)| nodes).for_each(|node| around[node as usize] += 1);
+    refinement.elements().flat_map(|(_, nodes)| nodes).for_each(|node| around[node as usize] += 1);
     around
 }
 

@@ -94,8 +94,8 @@ impl Refinement {
         self.tetrahedra.push(tetrahedron);
     }
 
-    /// Returns the leaves of the refinement with their ten nodes.
-    pub fn leaves(&self) -> impl Iterator<Item = (&Tetrahedron, [u32; 10])> {
+    /// Returns the elements of the refined mesh with their ten nodes.
+    pub fn elements(&self) -> impl Iterator<Item = (&Tetrahedron, [u32; 10])> {
         self.tetrahedra.iter().filter(|t| t.is_leaf).map(|t| (t, self.nodes(t.corners)))
     }
 

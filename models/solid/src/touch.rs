@@ -94,7 +94,7 @@ impl Zone {
         let mut refined: Refinement = body.base.clone();
         refined.refine(grading);
         let cells: Vec<Cell> = refined
-            .leaves()
+            .elements()
             .flat_map(|(leaf, _)| refined.touched(leaf))
             .map(|nodes| Cell::new(&refined.nodes_m, nodes))
             .filter(|cell| {

@@ -107,7 +107,7 @@ fn a_lump_is_felt_as_much_as_it_is_there() {
 fn a_refined_mesh_fills_the_same_volume_and_has_no_hanging_nodes() {
     let mesh = mesh("dome");
     let volume = |all: &Refinement| -> f64 {
-        let each = all.leaves().map(|(_, nodes)| {
+        let each = all.elements().map(|(_, nodes)| {
             let places = nodes.map(|node| all.nodes_m[node as usize]);
             let geometry = flotor_solid::cells::Geometry {
                 kind: flotor_solid::cells::Kind::Tetrahedron,
@@ -120,12 +120,12 @@ fn a_refined_mesh_fills_the_same_volume_and_has_no_hanging_nodes() {
     let base = Refinement::new(&mesh).expect("tetrahedra");
     let mut fine = base.clone();
     fine.refine(&Grading { points_m: vec![[0.0; 3]], least_m: 2.0e-3, grade: 0.5 });
-    let (before, after) = (base.leaves().count(), fine.leaves().count());
+    let (before, after) = (base.elements().count(), fine.elements().count());
     assert!(after > 2 * before, "{before} {after}");
     assert!((volume(&fine) / volume(&base) - 1.0).abs() < 1.0e-12);
     // Every touched corner edge belongs to two touched faces, or the surface ends there at the fixed face.
     let mut edges = std::collections::BTreeMap::<[u32; 2], usize>::new();
-    for face in fine.leaves().flat_map(|(leaf, _)| fine.touched(leaf)) {
+    for face in fine.elements().flat_map(|(leaf, _)| fine.touched(leaf)) {
         for k in 0..3 {
             let [a, b] = [face[k], face[(k + 1) % 3]];
             *edges.entry([a.min(b), a.max(b)]).or_default() += 1;

@@ -424,9 +424,9 @@ fn files_that_are_no_body_are_refused() {
         (good.replace("3 1 11 6", "3 1 14 6"), "type 14"),
         (good.replace("$EndElements\n", ""), "$EndElements"),
         (Boxes { to_m: [90.0; 3], ..apart }.text(), "metres"),
-        (good.replace("3 1 0 27", "3 1 0 99999999999"), "too many"),
+        (good.replace("3 1 0 27", "3 1 0 99999999999"), "exceed the limit"),
         (good.lines().take(59).collect::<Vec<_>>().join("\n"), "ends here"),
-        (in_blocks, "too many"),
+        (in_blocks, "exceed the limit"),
         // The number with no opposite: a physical group by its number, not a crash.
         (
             good.replace("1 0 0 0 0 0 0 1 1 0\n2", "1 0 0 0 0 0 0 1 -9223372036854775808 0\n2"),

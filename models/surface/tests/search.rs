@@ -1,6 +1,6 @@
 //! The proxy against an exhaustive search over all patches, for poses reached from outside.
 //!
-//! The proxy must be at the free place nearest to the tool. Where it is not, the nearest place must be out of reach: the reference
+//! The proxy must be at the free place nearest to the tool. Where it is not, the nearest place must be unreachable: the reference
 //! then follows the path of the tool.
 
 use crate::contact::{Hand, material};
@@ -134,7 +134,7 @@ fn compare(name: &str, surface: &Surface, deepest_m: f64, poses: usize, seed: u6
         }
     }
     println!(
-        "{name}: {} poses, {} in contact, {} with several contacts, {} where the nearest place is out of reach; depth differs by {:e} m, \
+        "{name}: {} poses, {} in contact, {} with several contacts, {} where the nearest place is not reachable; depth differs by {:e} m, \
          the point by {:e} m in {} poses; {} wrong",
         count.poses,
         count.contacts,

@@ -226,9 +226,9 @@ fn workspace_members(metadata: &Metadata) -> Vec<Member> {
         let uses = package.dependencies.iter().filter_map(|dependency| {
             let folder = dependency.path.as_ref()?.as_std_path();
             let role = role(&dependency.name, folder);
-            // Examples and tests may link a plugin in, and load it as a host does.
+            // Examples and tests may link a plugin in, load it as a host does, and solve its contacts as the loop does.
             let is_linked_in =
-                dependency.kind == DependencyKind::Development && matches!(role, Plugin | Loader);
+                dependency.kind == DependencyKind::Development && matches!(role, Plugin | Loader | Contact);
             (!is_linked_in).then(|| Use { name: dependency.name.clone(), role })
         });
         Member { name: package.name.to_string(), role: role(&package.name, own_folder), uses: uses.collect() }

@@ -318,7 +318,8 @@ impl Chapter {
     fn take_toml(&mut self, block: &Block) -> Result<(), String> {
         let included = block.text.trim().strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}"));
         let scene = match included {
-            Some(path) => workspace_root().join("docs/src").join(path).display().to_string(),
+            // As in mdBook, from the folder of the chapter.
+            Some(path) => workspace_root().join(&self.name).with_file_name(path).display().to_string(),
             None => self.keep(block, "toml", &whole_scene(&block.text)?)?,
         };
         self.step(block, &format!("flotor run '{scene}' --clock virtual --duration 5s"));

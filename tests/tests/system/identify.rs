@@ -97,7 +97,7 @@ fn input_without_a_law_is_refused_in_one_line_with_a_remedy() {
     let rows: String = (0..50).map(|row| format!("{row},{row}\n")).collect();
     let _ = scratch.file("static.csv", format!("displacement_mm,force_n\n{rows}"));
     for (arguments, says) in [
-        (&["still.mcap", "--axis", "x"][..], "`still.mcap`: the displacement is constant; press the thing"),
+        (&["still.mcap", "--axis", "x"][..], "`still.mcap`: the displacement is constant; press the object"),
         (&["static.csv", "--law", "zener"], "static.csv: the law `zener` depends on the velocity"),
         (&["none.csv"], "none.csv: cannot read the measurement"),
     ] {

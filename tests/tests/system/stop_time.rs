@@ -62,5 +62,5 @@ fn a_device_whose_stop_takes_long_is_named() {
 #[test]
 fn a_stop_that_waits_for_a_slow_command_is_named() {
     let slow = "IN_WRITE=static int writes; if (++writes > 1) { sleep(2); }";
-    assert_named(&stopped(&[slow]), &["before the last tick", "ms in it"]);
+    assert_named(&stopped(&[slow]), &["before the last tick", "ms during it"]);
 }

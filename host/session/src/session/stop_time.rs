@@ -113,7 +113,7 @@ mod tests {
             both.contains("`left` 21.0 ms after the request") && both.contains("`right` 21.0 ms"),
             "{both}"
         );
-        assert!(both.contains("16.0 ms passed before the last tick, 5.0 ms in it"), "{both}");
+        assert!(both.contains("16.0 ms passed before the last tick, 5.0 ms during it"), "{both}");
     }
 
     /// A run that another one stops counts from the press of the other.
