@@ -39,6 +39,8 @@ pub struct Answer {
 pub const DEEPEST: f64 = 0.9;
 /// Estimated error up to which the law holds.
 pub const LARGEST_ERROR: f64 = 0.04;
+/// Error of the depth, in radii: most of the error of a shallow contact.
+const SHALLOW: f64 = 0.001;
 
 impl Answer {
     /// Returns true if the law holds at this place.
@@ -52,30 +54,19 @@ impl Anywhere {
     /// Returns the answer with the centre at `centre_m` (finite), in the frame of the mesh. Real-time: bounded, no allocation.
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let step_m = self.lattice.step_m;
-        // Negative at the border of the lattice, so zero beyond it.
         let p = self.lattice.at(centre_m);
-        let energy = if p.value > 0.0 {
-            // Beyond the deepest contact the force grows no more.
-            let most = DEEPEST * self.radius_m / step_m;
-            let within = p.value.min(most);
-            let scale = self.hertz * step_m * step_m * step_m.sqrt();
-            let (root, over) = (within.sqrt(), p.value - within);
-            let slope = 2.5 * scale * within * root;
-            p.chain(scale * within * within * root + slope * over, slope)
-        } else {
-            Jet::default()
-        };
-        let depth_m = self.lattice.between(&self.depths_m, centre_m);
-        Answer { energy, depth_m, error: self.lattice.between(&self.errors, centre_m) }
-    }
-
-    /// Returns the mean estimated error where the law holds. Not real-time.
-    #[must_use]
-    pub fn mean_error(&self) -> f64 {
-        let all = self.errors.iter().zip(&self.depths_m).filter(|(_, depth_m)| **depth_m > 0.0);
-        let held: Vec<f64> =
-            all.map(|(e, _)| f64::from(*e)).filter(|error| *error <= LARGEST_ERROR).collect();
-        if held.is_empty() { 1.0 } else { held.iter().sum::<f64>() / held.len() as f64 }
+        // Beyond the deepest contact the force grows no more.
+        let within = p.value.max(0.0).min(DEEPEST * self.radius_m / step_m);
+        let scale = self.hertz * step_m * step_m * step_m.sqrt();
+        let (root, over) = (within.sqrt(), (p.value - within).max(0.0));
+        let slope = 2.5 * scale * within * root;
+        let energy = p.chain(scale * within * within * root + slope * over, slope);
+        let [depth_m, error] = [&self.depths_m, &self.errors].map(|l| self.lattice.between(l, centre_m));
+        Answer {
+            energy,
+            depth_m,
+            error: error + SHALLOW * self.radius_m / depth_m.abs().max(f64::MIN_POSITIVE),
+        }
     }
 
     /// Returns all numbers of the law, for the cache. Not real-time.

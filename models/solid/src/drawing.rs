@@ -117,20 +117,16 @@ impl Drawing {
 
     /// Draws a mesh with its surface moved out of a sphere centred at `centre_m` (finite); the surface around is drawn undeformed.
     pub fn ball(&mut self, radius_m: f64, centre_m: DVec3) -> &Shape {
+        self.under(&[], Focus { at_m: centre_m, width_m: radius_m }, radius_m);
         let Shape { primitives, surface } = &mut self.shape;
-        if let Look::Sphere(Some(skin)) = &self.look {
-            surface.vertices.clear();
-            surface.vertices.extend(skin.places_m.iter().map(|place_m| {
-                let away_m = *place_m - centre_m;
-                let moved_m = centre_m + away_m.normalize_or_zero() * away_m.length().max(radius_m);
-                let value = moved_m.distance(*place_m) * 1.0e3;
-                SurfaceVertex { position_m: moved_m.to_array(), normal: [0.0; 3], value }
-            }));
-            surface.triangles.clone_from(&skin.triangles);
-            surface.field = DISPLACEMENT;
-            surface.set_normals();
+        for vertex in &mut surface.vertices {
+            let away_m = DVec3::from_array(vertex.position_m) - centre_m;
+            let moved_m = (radius_m - away_m.length()).max(0.0);
+            vertex.position_m = (centre_m + away_m + away_m.normalize_or_zero() * moved_m).to_array();
+            vertex.value = moved_m * 1.0e3;
         }
-        primitives.clear();
+        surface.field = DISPLACEMENT;
+        surface.set_normals();
         primitives.push(Primitive::sphere(Part::Tool, Pose::new(centre_m, DQuat::IDENTITY), radius_m));
         &self.shape
     }

@@ -32,19 +32,19 @@ impl Facet {
     /// Returns the quadrature points of the facet. Not real-time.
     #[must_use]
     pub fn points(&self, nodes_m: &[[f64; 3]]) -> Vec<SurfacePoint> {
-        face_rule(self.corners)
-            .into_iter()
-            .map(|(at, weight)| {
-                let shapes = face_shapes(self.corners, at);
-                let [position_m, u, v] =
-                    sum(&self.nodes, nodes_m, |k| [shapes[k].0, shapes[k].1[0], shapes[k].1[1]]);
-                let normal_m2 = [0, 1, 2].map(|k| {
-                    let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                    weight * (u[i] * v[j] - u[j] * v[i])
-                });
-                SurfacePoint { position_m, normal_m2, shares: shapes.into_iter().map(|s| s.0).collect() }
-            })
-            .collect()
+        face_rule(self.corners).into_iter().map(|(at, weight)| self.point(nodes_m, at, weight)).collect()
+    }
+
+    /// Returns the point at `at` of the reference face, with the area of so much of that face. Not real-time.
+    #[must_use]
+    pub fn point(&self, nodes_m: &[[f64; 3]], at: [f64; 2], weight: f64) -> SurfacePoint {
+        let shapes = face_shapes(self.corners, at);
+        let [position_m, u, v] = sum(&self.nodes, nodes_m, |k| [shapes[k].0, shapes[k].1[0], shapes[k].1[1]]);
+        let normal_m2 = [0, 1, 2].map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            weight * (u[i] * v[j] - u[j] * v[i])
+        });
+        SurfacePoint { position_m, normal_m2, shares: shapes.into_iter().map(|s| s.0).collect() }
     }
 
     /// Returns false if the point at x and y `at_m` lies clearly outside the facet. Not real-time.

@@ -14,7 +14,7 @@ use crate::mesh::Mesh;
 use crate::prepare::{Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh};
 use crate::punch::{Outline, extrapolated};
 use crate::refinement::Refinement;
-use crate::remainder::{Face, Remainder, Resolution};
+use crate::remainder::{Face, Remainder};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{ExtraCompliance, Spheres};
 use crate::sphere::NotConverged;
@@ -42,12 +42,6 @@ type Prepares = Result<(Law, f64), Refusal>;
 type Numbers = Result<Vec<f64>, Refusal>;
 
 impl Description {
-    /// Returns the key of the cache: all that the law depends on, with the exact bits of every number.
-    fn words(&self) -> String {
-        // Debug prints the shortest decimal that reads back as the same number.
-        format!("{self:?}")
-    }
-
     /// Loads the law from the cache, or solves for it and caches it; also returns the estimated error of its mesh. `mesh`: mesh of
     /// [`Body::File`]. Not real-time: up to some seconds, for a large mesh a minute.
     ///
@@ -60,7 +54,8 @@ impl Description {
                 None => solve().inspect(|numbers| cache::store(words, numbers)),
             });
         }
-        let words = self.words();
+        // Debug prints the shortest decimal that reads back as the same number.
+        let words = format!("{self:?}");
         if let Some(found) = cache::load(&words).and_then(|numbers| self.read(&numbers)) {
             return Ok(found);
         }
@@ -101,24 +96,19 @@ impl Description {
         Ok((Law::Spheres(Box::new(spheres)), mesh_error))
     }
 
-    /// Loads the law of a sphere anywhere on a mesh from the cache, or surveys the body and caches it; also returns the mean
-    /// estimated error. `materials`: of each physical volume, for a Young's modulus of 1 Pa of this solid. Not real-time: minutes.
+    /// Loads the law of a sphere anywhere on a mesh from the cache, or surveys the body and caches it. `materials`: of each physical volume, for a Young's modulus of 1 Pa of this solid. Not real-time: minutes.
     ///
     /// # Errors
     /// A [`Refusal`] if the tool is not one sphere, or an element not a tetrahedron, or a material not elastic.
-    pub fn prepare_anywhere(&self, mesh: &Mesh, materials: &[Material]) -> Result<(Law, f64), Refusal> {
+    pub fn prepare_anywhere(&self, mesh: &Mesh, materials: &[Material]) -> Result<Law, Refusal> {
         let Tool::Sphere { radius_m } = self.tool else {
             return Err(Refusal::unsupported(
                 "origin = \"body\" is for one sphere: set tool = \"sphere\" and omit `tool_count`, or set origin = \"home\"",
             ));
         };
-        let done = |law: Anywhere| {
-            let error = law.mean_error();
-            (Law::Anywhere(Box::new(law)), error)
-        };
-        let words = format!("anywhere {} {materials:?}", self.words());
+        let words = format!("anywhere {self:?} {materials:?}");
         if let Some(law) = cache::load(&words).and_then(|numbers| Anywhere::from_numbers(&numbers)) {
-            return Ok(done(law));
+            return Ok(Law::Anywhere(Box::new(law)));
         }
         let base = Refinement::new(mesh).ok_or_else(|| {
             Refusal::resource(
@@ -130,9 +120,13 @@ impl Description {
         let regions = mesh.elements.iter().map(|element| element.region).collect();
         let body = Condensation::new(base, lames, regions)?;
         let hertz = 8.0 / 15.0 / (1.0 - self.poisson_ratio * self.poisson_ratio) * radius_m.sqrt();
-        let law = survey(mesh, &body, radius_m, hertz, effort(self.resolution))?;
+        let places = 32 * self.resolution.bricks; // 128, 192 and 256
+        let mut law = survey(mesh, &body, radius_m, hertz, (places, 0.7))?;
+        if materials.iter().any(|material| *material != materials[0]) {
+            law.errors.fill(1.0); // the contrast of a lump is not proven
+        }
         cache::store(&words, &law.to_numbers());
-        Ok(done(law))
+        Ok(Law::Anywhere(Box::new(law)))
     }
 
     fn read(&self, numbers: &[f64]) -> Option<(Law, f64)> {
@@ -237,15 +231,6 @@ impl Description {
     }
 }
 
-/// Returns the number of places of a survey, and the size of elements over the distance from a place.
-fn effort(resolution: Resolution) -> (usize, f64) {
-    match resolution {
-        Resolution::QUICK => (72, 0.9),
-        Resolution::FINE => (480, 0.7),
-        _ => (192, 0.8),
-    }
-}
-
 /// Returns the refusal of `body = "file"` without a mesh.
 pub(crate) fn no_mesh() -> Refusal {
     Refusal::parameter("body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)")
@@ -269,7 +254,6 @@ fn sphere(prepared: Prepared) -> (Law, f64) {
 fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
     match law {
         Law::Sphere(atlas) => Prepared { atlas: (**atlas).clone(), mesh_error }.to_numbers(),
-        // Cached as the law of a single sphere.
         Law::Anywhere(law) => law.to_numbers(),
         Law::Spheres(spheres) => Prepared { atlas: spheres.atlas.clone(), mesh_error }.to_numbers(),
         Law::Bonded(patch) => {
@@ -301,6 +285,7 @@ impl From<NotConverged> for Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::remainder::Resolution;
 
     /// The remedies were those for a mesh file: a scaling factor of Gmsh, and the order of the nodes of an element.
     #[test]

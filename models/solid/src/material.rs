@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(all, [common, Material { youngs_modulus_pa: 1.0e5, ..common }]);
         for (text, line) in [
             ("[tissue]\n[bone]\n", 2),
-            ("[lump]\nhard = 1\n", 1),
+            ("[lump]\nhard = 1\n", 2),
             ("[lump]\npoisson_ratio = 0.5\n", 1),
             ("[lump\n", 1),
         ] {

@@ -155,7 +155,8 @@ impl ForceModel for Solid {
                     youngs_modulus_pa: m.youngs_modulus_pa / common.youngs_modulus_pa,
                     ..*m
                 };
-                description.prepare_anywhere(mesh, &materials.iter().map(relative).collect::<Vec<_>>())?
+                let materials: Vec<Material> = materials.iter().map(relative).collect();
+                (description.prepare_anywhere(mesh, &materials)?, f64::NAN)
             }
             _ => description.prepare(read.as_ref().map(|read| &read.mesh))?,
         };
@@ -323,3 +324,80 @@ impl DetailsModel for Solid {
 }
 
 flotor_hal::export_model!(Solid, variant, details, shape, snapshot);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anywhere::Anywhere;
+    use crate::description::Body;
+    use crate::lattice::Lattice;
+    use crate::remainder::Resolution;
+    use flotor_hal::{DQuat, math};
+
+    const BALL_M: f64 = 0.005;
+    const BODY_M: f64 = 0.02;
+
+    /// A round body about the origin, its law written down instead of prepared.
+    #[allow(clippy::cast_possible_truncation)] // lengths
+    fn round() -> Solid {
+        let counts = [34; 3];
+        let mut lattice =
+            Lattice { low_m: [-0.033; 3], step_m: 0.002, counts, values: vec![0.0; 34 * 34 * 34] };
+        let depth_m = |at: [f64; 3]| BALL_M + BODY_M - DVec3::from_array(at).length();
+        let depths: Vec<f64> = (0..lattice.values.len()).map(|i| depth_m(lattice.place_m(i))).collect();
+        lattice.values = depths.iter().map(|d| d / lattice.step_m).collect();
+        let errors = vec![0.01; depths.len()];
+        let depths_m = depths.iter().map(|d| *d as f32).collect();
+        let law = Anywhere { radius_m: BALL_M, hertz: 0.04, lattice, depths_m, errors };
+        let description = Description {
+            body: Body::File { digest: 0 },
+            tool: Tool::Sphere { radius_m: BALL_M },
+            poisson_ratio: 0.3,
+            resolution: Resolution::QUICK,
+        };
+        Solid {
+            law: Law::Anywhere(Box::new(law)),
+            mesh_error: f64::NAN,
+            friction: [Friction::new(0.0, 0.3, BALL_M); MAX_SPHERES],
+            was_outside: false,
+            depth_m: f64::NAN,
+            contacts: f64::NAN,
+            parameters: resolve(&Settings::defaults(SCHEMA)),
+            description,
+            mesh: None,
+            drawing: None,
+            nothing: Shape::default(),
+        }
+    }
+
+    fn step(solid: &mut Solid, at_m: DVec3) -> (f64, StepStatus) {
+        let output = solid.step(&Input::at_rest(Pose::new(at_m, DQuat::IDENTITY)));
+        (output.wrench.force().length(), output.status().expect("a known code"))
+    }
+
+    /// Reset, as after a fault or for a new session, is a start too.
+    #[test]
+    fn a_ball_that_starts_inside_feels_nothing_until_it_was_outside() {
+        let mut solid = round();
+        let (mut starts, mut felt) = (0, 0);
+        for n in 0..1_000_u32 {
+            let (turn, rise) = (f64::from(n) * 2.4, 1.0 - 2.0 * (f64::from(n) + 0.5) / 1_000.0);
+            let flat = (1.0 - rise * rise).sqrt();
+            let (sine, cosine) = math::sin_cos(turn);
+            let away = DVec3::new(flat * cosine, flat * sine, rise);
+            solid.reset();
+            for share in [0.0, 0.3, 0.8, 0.9, 0.5] {
+                assert_eq!(step(&mut solid, away * (share * BODY_M)), (0.0, StepStatus::OutOfDomain));
+                starts += 1;
+            }
+            // A centre outside is outside, though the ball overlaps.
+            let (force_n, status) = step(&mut solid, away * (BODY_M + 0.4 * BALL_M));
+            assert!(force_n > 0.1 && status == StepStatus::Ok, "{force_n} {status:?}");
+            let deep = step(&mut solid, away * (0.8 * BODY_M));
+            assert!(deep.0 > force_n && deep.1 == StepStatus::OutOfDomain);
+            assert_eq!(step(&mut solid, away * (BODY_M + 1.1 * BALL_M)), (0.0, StepStatus::Ok));
+            felt += 1;
+        }
+        assert_eq!((starts, felt), (5_000, 1_000));
+    }
+}

@@ -52,19 +52,33 @@ const OF_MESH: f64 = 0.015;
 /// Distances of the surface are measured up to this one, in radii.
 const SIGHT: f64 = 1.6;
 
-/// Points of the touched surface, sorted into boxes.
+/// Points of the touched surface with the normals there, sorted into boxes.
 struct Surface {
-    boxes: HashMap<[i32; 3], Vec<DVec3>>,
+    boxes: HashMap<[i32; 3], Vec<[DVec3; 2]>>,
     radius_m: f64,
+    /// Nodes that do not move, m.
+    fixed_m: Vec<DVec3>,
 }
 
+/// Distance of the points of the surface, in radii.
+const SPACING: f64 = 0.1;
+/// The law ends nearer than this to a node that does not move, in radii.
+const HELD: f64 = 1.1;
+
 impl Surface {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some hundred points a side
     fn new(mesh: &Mesh, radius_m: f64) -> Self {
-        let mut all = Self { boxes: HashMap::new(), radius_m };
-        for facet in &mesh.touched {
-            let inner = facet.points(&mesh.nodes_m).into_iter().map(|point| point.position_m);
-            for at in inner.chain(facet.nodes.iter().map(|node| mesh.nodes_m[*node])).map(DVec3::from_array) {
-                all.boxes.entry(all.key(at)).or_default().push(at);
+        let fixed = mesh.nodes_m.iter().zip(&mesh.fixed).filter(|node| *node.1);
+        let fixed_m = fixed.map(|node| DVec3::from_array(*node.0)).collect();
+        let mut all = Self { boxes: HashMap::new(), radius_m, fixed_m };
+        for facet in mesh.touched.iter().filter(|facet| facet.corners == 3) {
+            let corner = |k: usize| DVec3::from_array(mesh.nodes_m[facet.nodes[k % 3]]);
+            let side_m = (0..3).map(|k| corner(k).distance(corner(k + 1))).fold(0.0, f64::max);
+            let count = (side_m / (SPACING * radius_m)).ceil().min(300.0) as usize;
+            for (i, j) in (0..=count).flat_map(|i| (0..=count - i).map(move |j| (i, j))) {
+                let point = facet.point(&mesh.nodes_m, [i, j].map(|c| c as f64 / count as f64), 1.0);
+                let [at, normal] = [point.position_m, point.normal_m2].map(DVec3::from_array);
+                all.boxes.entry(all.key(at)).or_default().push([at, normal.normalize_or_zero()]);
             }
         }
         all
@@ -80,8 +94,12 @@ impl Surface {
         let [x, y, z] = self.key(centre_m);
         for n in 0..125 {
             let key = [x + n % 5 - 2, y + n / 5 % 5 - 2, z + n / 25 - 2];
-            for at in self.boxes.get(&key).into_iter().flatten() {
-                let distance_m = at.distance(centre_m);
+            for [at, normal] in self.boxes.get(&key).into_iter().flatten() {
+                let away_m = centre_m - *at;
+                let [whole, along] = [away_m.length(), away_m.dot(*normal).abs()];
+                // Between the points the surface is nearly a plane.
+                let beside_m = (whole * whole - along * along).max(0.0).sqrt();
+                let distance_m = if beside_m < 0.6 * SPACING * self.radius_m { along } else { whole };
                 if distance_m < SIGHT * self.radius_m {
                     visit(*at, distance_m);
                 }
@@ -96,12 +114,16 @@ impl Surface {
         least
     }
 
+    /// Returns true if the ball nearly reaches a node that does not move: the body does not yield there.
+    fn is_held(&self, centre_m: DVec3) -> bool {
+        self.fixed_m.iter().any(|at| at.distance(centre_m) < HELD * self.radius_m)
+    }
+
     /// Returns the line of centres through `at_m`.
     fn column(&self, at_m: DVec3) -> Column {
         let mut sum = DVec3::ZERO;
         self.near(at_m, |at, distance| sum += (at_m - at) * (self.radius_m / distance - 1.0).max(0.0));
         let normal = sum.normalize_or(DVec3::Z);
-        // The depth grows along the line, so halving finds it.
         let reach = |depth_m: f64| {
             let [mut near, mut far] = [-self.distance_m(at_m), 1.2 * self.radius_m];
             for _ in 0..40 {
@@ -111,10 +133,8 @@ impl Surface {
             }
             at_m + normal * far
         };
-        let depths_m = DEPTHS.iter().map(|share| share * self.radius_m);
-        let samples: Vec<Sample> = depths_m
-            .map(|depth_m| Sample { centre_m: reach(depth_m), depth_m, ..Sample::default() })
-            .collect();
+        let sample = |depth_m| Sample { centre_m: reach(depth_m), depth_m, ..Sample::default() };
+        let samples: Vec<Sample> = DEPTHS.iter().map(|share| sample(share * self.radius_m)).collect();
         // Places where the ball overlaps most; further ones lie in other directions, as the second lip of a groove.
         let middle = samples.get(DEPTHS.len() / 2).map_or(at_m, |sample| sample.centre_m);
         let mut points: Vec<(DVec3, f64)> = Vec::new();
@@ -213,15 +233,12 @@ fn inside(mesh: &Mesh, lattice: &Lattice) -> Vec<bool> {
     let [nx, ny, _] = lattice.counts;
     for element in &mesh.elements {
         let corners = [0, 1, 2, 3].map(|k| DVec3::from_array(mesh.nodes_m[element.nodes[k]]));
-        let place = |at: DVec3| ((at - DVec3::from_array(lattice.low_m)) / lattice.step_m).to_array();
-        let low =
-            place(corners.into_iter().reduce(DVec3::min).unwrap_or_default()).map(|c| c.ceil() as usize);
-        let high =
-            place(corners.into_iter().reduce(DVec3::max).unwrap_or_default()).map(|c| c.floor() as usize);
-        for k in low[2]..=high[2] {
-            for index in
-                (low[1]..=high[1]).flat_map(|j| (low[0]..=high[0]).map(move |i| (k * ny + j) * nx + i))
-            {
+        let place = |at: DVec3| (at - DVec3::from_array(lattice.low_m)) / lattice.step_m;
+        let low = place(corners.into_iter().fold(corners[0], DVec3::min)).ceil().to_array();
+        let high = place(corners.into_iter().fold(corners[0], DVec3::max)).to_array();
+        let [x, y, z] = [0, 1, 2].map(|k| low[k] as usize..=high[k] as usize);
+        for (k, j) in z.flat_map(|k| y.clone().map(move |j| (k, j))) {
+            for index in x.clone().map(|i| (k * ny + j) * nx + i) {
                 let at = DVec3::from_array(lattice.place_m(index));
                 let [a, b, c, d] = corners.map(|corner| corner - at);
                 let volumes = [a.cross(c).dot(b), a.cross(b).dot(d), a.cross(d).dot(c), b.cross(c).dot(d)];
@@ -274,6 +291,7 @@ impl<'a> Survey<'a> {
         let candidates: Vec<DVec3> = (0..self.law.depths_m.len())
             .filter(|&index| (0.3..0.75).contains(&(f64::from(self.law.depths_m[index]) / radius_m)))
             .map(|index| DVec3::from_array(self.law.lattice.place_m(index)))
+            .filter(|at| !self.surface.is_held(*at))
             .collect();
         let need = |error: f64| 1.0 + if error.is_finite() { (error / 0.02).min(2.0) } else { 0.0 };
         let known = |c: DVec3| self.columns.iter().map(move |k| c.distance(k.at_m) * need(k.errors[0]));
@@ -331,7 +349,7 @@ impl<'a> Survey<'a> {
             (sample, Datum { at_m: sample.centre_m.to_array(), target, weights })
         });
         let (Some(first), Some((last, Datum { target, .. }))) =
-            (solved.clone().next(), solved.clone().last())
+            (solved.clone().next(), solved.clone().next_back())
         else {
             return;
         };
@@ -367,17 +385,12 @@ impl<'a> Survey<'a> {
             let at = DVec3::from_array(self.law.lattice.place_m(index));
             if depth < -2.0 * STEP {
                 self.law.errors[index] = 0.0;
-            } else if depth < DEEPEST + 2.0 * STEP {
-                let mut near = [(f64::INFINITY, 1.0, 0.0); 3];
-                for (place, error, apart) in &known {
-                    let next = (place.distance(at), *error, *apart);
-                    if next.0 < near[2].0 {
-                        near[2] = next;
-                        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-                    }
-                }
-                let is_near = near[0].0 < 1.2 * near[0].2 + 0.6 * radius_m;
-                let error = near.iter().map(|n| n.1).fold(0.0, f64::max);
+            } else if depth < DEEPEST + 2.0 * STEP && !self.surface.is_held(at) {
+                let mut near: Vec<_> =
+                    known.iter().map(|(c, e, apart)| (c.distance(at), *e, *apart)).collect();
+                near.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let is_near = near.first().is_some_and(|n| n.0 < 1.2 * n.2 + 0.6 * radius_m);
+                let error = near.iter().take(3).map(|n| n.1).fold(0.0, f64::max);
                 self.law.errors[index] = if is_near { error as f32 } else { 1.0 };
             }
         }

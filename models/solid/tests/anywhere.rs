@@ -10,14 +10,14 @@ use flotor_solid::refinement::{Grading, Refinement};
 use flotor_solid::touch::{Touch, Zone};
 
 /// A mesh of the test data: `dome`, `groove` or `lump`, with 8, 10 and 16 mm elements, as Gmsh writes them.
-fn mesh(name: &str) -> Mesh {
+pub(crate) fn mesh(name: &str) -> Mesh {
     let path = format!("{}/tests/data/{name}.msh", env!("CARGO_MANIFEST_DIR"));
     let text = gmsh::to_text(&std::fs::read(path).expect("a file")).expect("a binary mesh");
     Mesh::in_place(gmsh::read(&text).expect("a mesh"), "fixed", None).expect("a body")
 }
 
 /// The body of a row, its lump `factor` as stiff.
-fn body(name: &str, poisson_ratio: f64, factor: f64) -> Condensation {
+pub(crate) fn body(name: &str, poisson_ratio: f64, factor: f64) -> Condensation {
     let mesh = mesh(name);
     let base = Refinement::new(&mesh).expect("tetrahedra");
     let material = |region: &String| Lame::new(if region == "lump" { factor } else { 1.0 }, poisson_ratio);

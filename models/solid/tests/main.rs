@@ -3,6 +3,7 @@
 mod anywhere;
 mod contact;
 mod finer;
+mod law;
 mod mesh;
 #[allow(unreachable_pub)] // shared with the other tests
 #[path = "../../../tests/src/printed.rs"]
