@@ -55,7 +55,7 @@ fn an_error_prints_place_cause_and_remedy() {
     let error = ContactSet::new(&Pose::HOME, &contacts, Validity::UNLIMITED).expect_err("a gap is NaN");
     assert_eq!(error.to_string(), "contact 1: `gap_m` is not finite, or larger than 1e9");
     let error = ContactSet::new(&Pose::HOME, &[floor(0.0); 17], Validity::UNLIMITED).expect_err("too many");
-    assert_eq!(error.to_string(), "17 contacts: a set has at most 16; send the deepest ones");
+    assert_eq!(error.to_string(), "the set has 17 contacts, above the limit of 16; send the deepest ones");
     let nowhere = Pose { orientation_xyzw: [0.0; 4], ..Pose::HOME };
     let error = ContactSet::new(&nowhere, &[], Validity::UNLIMITED).expect_err("no orientation");
     assert_eq!(error, ContactSetError::Anchor);
