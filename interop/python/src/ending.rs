@@ -44,7 +44,7 @@ impl Prepared {
         Ok((Self { scene, options, plugins }, session, measured))
     }
 
-    /// Finishes the recording of a run and frees its plugins. `notices`: what would have been shown before the run. Not real-time.
+    /// Finishes the recording of a run and frees its plugins. `notices`: notes from before the run. Not real-time.
     pub(crate) fn conclude(
         &self,
         mut measured: Measurements,

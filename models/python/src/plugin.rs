@@ -122,7 +122,7 @@ impl ContactSetModel for PythonModel {
 }
 flotor_hal::export_model!(PythonModel, contact_set);
 
-/// Returns a set that the host refuses: it goes on with the last one until its force has faded, and its report names the model.
+/// Returns an invalid set: the host keeps the last valid one until its force has faded, and reports the model by name.
 fn refused(input: &Input) -> ContactSet {
     ContactSet::at(input).with(Contact::of_handle(input, DVec3::Z, f64::NAN, f64::NAN))
 }

@@ -1,4 +1,4 @@
-//! The interpreter answers, and what may happen to it: an exception, an answer that is none, a process that is killed or hangs.
+//! Answers and failures of the interpreter: an exception, an invalid answer, a process that is killed or hangs.
 
 #[path = "../../../tests/src/tools.rs"]
 #[allow(dead_code, unreachable_pub)] // the other tests use the rest

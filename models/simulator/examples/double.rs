@@ -1,4 +1,4 @@
-//! Simulator that stands in for real ones in tests: a floor at z = 0, and what simulators do wrong.
+//! Test double of a simulator: a floor at z = 0, and the faults of simulators.
 //!
 //! `double KIND [TICK]`: from pose number TICK on it hangs, ends, sends NaN or 1e308, goes back in time, floods, is slow, or claims a floor
 //! above the hand.

@@ -5,7 +5,7 @@
 //! than it is valid, its force fades within 20 ms, whatever the program does meanwhile.
 //!
 //! - [`messages`]: poses and sets as bytes. [`link`](mod@link): the program, its socket and its end.
-//! - [`answers`]: the newest set, with its age, and what a program may not say.
+//! - [`answers`]: the newest set with its age, and the checks of a set.
 //! - [`program`]: the other side, for programs in Rust.
 //! - `plugin`: the contract. `platform`: sockets of the system.
 

@@ -151,7 +151,7 @@ impl Link {
         Ok(())
     }
 
-    /// Reads sets until one for the pose `number` has come; returns false if `most` is over before. Not real-time.
+    /// Reads sets up to that for the pose `number`; returns false without one within `most`. Not real-time.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -192,7 +192,7 @@ impl Link {
 }
 
 impl Drop for Link {
-    /// Closes the socket, which tells the program that the run is over, and kills it if it goes on.
+    /// Closes the socket, the end of the run for the program, and kills a program that continues.
     fn drop(&mut self) {
         self.socket = None;
         if self.farewell().is_none() {

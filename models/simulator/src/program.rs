@@ -51,7 +51,7 @@ impl Connection {
         self.socket.send(&set.to_bytes())
     }
 
-    /// Sends bytes as they are: for tests of what Flotor refuses. Not real-time.
+    /// Sends bytes unchanged, for tests of malformed messages. Not real-time.
     ///
     /// # Errors
     /// As [`Self::send`].

@@ -36,7 +36,7 @@ choice! {
     Unit { Metre = "m", Millimetre = "mm" }
 }
 choice! {
-    /// What the pose is: the displacement from home, or the place of the sphere's centre in the frame of the mesh.
+    /// Meaning of the pose: displacement from home, or position of the sphere's centre in the frame of the mesh.
     Origin { Home = "home", Body = "body" }
 }
 

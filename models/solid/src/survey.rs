@@ -194,7 +194,7 @@ struct Survey<'a> {
     body: &'a Condensation,
     surface: Surface,
     law: Anywhere,
-    /// Depth in steps, and what the fit adds to it.
+    /// Depth in steps, with the correction of the fit.
     base: Lattice,
     change: Lattice,
     /// Data that hold where nothing is solved.

@@ -83,7 +83,7 @@ fn a_dome_and_a_groove_answer_as_the_tables_say() {
     }
 }
 
-/// A tenth of what the lump adds is the bound of the contrast: the errors of the mesh cancel in the ratio.
+/// The bound of the contrast is a tenth of the lump's contribution: the errors of the mesh cancel in the ratio.
 #[test]
 fn a_lump_is_felt_as_much_as_it_is_there() {
     if leaves_out_long_tests() {
@@ -102,7 +102,7 @@ fn a_lump_is_felt_as_much_as_it_is_there() {
     }
 }
 
-/// Halving elements changes neither the volume nor what a curved body is.
+/// Halving elements changes neither the volume nor the shape of a curved body.
 #[test]
 fn a_refined_mesh_fills_the_same_volume_and_has_no_hanging_nodes() {
     let mesh = mesh("dome");

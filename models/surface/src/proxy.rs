@@ -40,7 +40,7 @@ struct Over {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ball {
     pub(crate) radius_m: f64,
-    /// What the radius exceeds that of the tool by, m.
+    /// Excess of the radius over that of the tool, m.
     pub(crate) skin_m: f64,
     /// Centre, m.
     pub(crate) centre_m: DVec3,

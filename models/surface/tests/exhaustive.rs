@@ -223,7 +223,7 @@ impl<'a> Patches<'a> {
             .any(|way| self.is_free(point_m + way * PROBE_M, 0.05 * PROBE_M))
     }
 
-    /// The same for a point: from where its way meets the surface, the closest point is followed from patch to patch that touch.
+    /// Moves a point: follows the closest point from the crossing of the surface, over adjacent patches.
     fn followed_point(&self, from_m: DVec3, c_m: DVec3, steps: f64) -> DVec3 {
         let mut held: Option<Place> = None;
         let mut last_m = from_m;

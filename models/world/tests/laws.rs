@@ -1,4 +1,4 @@
-//! What the tool feels and what the bodies do, against closed forms.
+//! Forces on the tool and motions of the bodies against closed forms.
 
 use flotor_hal::{ContactSet, ContactSetModel, DQuat, DVec3, ForceModel, Input, Pose};
 use flotor_world::file::{World, parse};

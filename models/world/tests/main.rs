@@ -1,3 +1,3 @@
-//! The world as a library: what bodies do, and what the tool feels of them.
+//! Tests of the world as a library: motions of bodies, and their forces on the tool.
 
 mod laws;
